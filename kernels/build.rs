@@ -108,7 +108,7 @@ fn mistake(
             return Some(format!("writes `{name}`, which its stage only reads"));
         }
         let (found, wanted) = (bound.stride?, prelude::stride(argument)?);
-        let told = || format!("sees {found} bytes an element of `{name}`, core {wanted}");
+        let told = || format!("sees {found} bytes per element of `{name}`, core has {wanted}");
         (found != wanted).then(told)
     })
 }

@@ -52,7 +52,7 @@ say "documentation"
 RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
     cargo doc --workspace --no-deps --document-private-items --quiet
 
-say "licences and versions of what is depended on"
+say "licences and versions of dependencies"
 if command -v cargo-deny >/dev/null || cargo install --quiet --locked cargo-deny@0.20.2; then
     cargo deny --log-level error check licenses bans sources
 else
@@ -102,7 +102,7 @@ bare() {
     cmp <(grep digest target/bare) <(grep digest target/hosted) || exit 1
     echo "on a bare aarch64 machine and here: $(grep digest target/bare)"
 }
-bare || echo "skipped: no target or emulator for a bare aarch64 machine to be had"
+bare || echo "skipped: no target or emulator for a bare aarch64 machine available"
 
 say "the program alone, onboard, with every index clamped, and for aarch64"
 cargo build --quiet --release -p raywake --all-features
@@ -139,14 +139,14 @@ aarch64() {
     chmod +x target/raywake-aarch64
     others+=(target/raywake-aarch64)
 }
-aarch64 || echo "skipped: no aarch64 compiler, linker or emulator to be had"
+aarch64 || echo "skipped: no aarch64 compiler, linker or emulator available"
 RAYWAKE_DIGEST_OF=$(printf "$PWD/%s:" "${others[@]}")
 export RAYWAKE_DIGEST_OF=${RAYWAKE_DIGEST_OF%:}
 
 say "tests"
 unable=()
 browser >/dev/null || {
-    echo "skipped: reports in a browser, there is none"
+    echo "skipped: reports in a browser, as there is none"
     unable=(--skip a_browser)
 }
 if [ -n "${RAYWAKE_DATA:-}" ]; then
@@ -156,7 +156,7 @@ else
     cargo test --quiet -p raywake-lab --lib a_browser -- --ignored "${unable[@]}"
 fi
 
-say "tests of what is compiled unless more is asked for"
+say "tests with a reduced set of features"
 cargo test --quiet -p raywake -p raywake-io --no-default-features --features raywake/demo,raywake/png
 
 say "the library for C"
@@ -204,7 +204,7 @@ if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
         [ -s "target/installed/$file" ] || { echo "$file is missing"; exit 1; }
     done
 else
-    echo "skipped: no Debian package can be made here"
+    echo "skipped: no Debian package can be built here"
 fi
 
 say "many recordings, many processes"
@@ -216,7 +216,7 @@ fi
 cargo build --quiet -p raywake-lab -p raywake-faulty-layer
 tests/shards.sh target/release/raywake target/debug/raywake-lab
 
-say "instructions of every stage, twice the same"
+say "instructions of every stage, identical on both runs"
 if command -v valgrind >/dev/null; then
     instructions() {
         target/debug/raywake-lab instructions -n 3 --out target/instructions | grep -v report

@@ -13,7 +13,7 @@ mkdir -p "$work"
 
 "$lab" sim "$work/drives" --drives 8 --sweeps 3 --seed 5 >/dev/null
 find "$work/drives" -name '*_sync' -type d | sort >"$work/list"
-[ "$(wc -l <"$work/list")" = 8 ] || { echo "8 drives were to be simulated"; exit 1; }
+[ "$(wc -l <"$work/list")" = 8 ] || { echo "8 drives should have been simulated"; exit 1; }
 cat >"$work/task" <<EOF
 #!/bin/sh
 exec "$program" run --list "$work/list" --out "\$1" --parquet --backend scalar --quiet \${2:-}
@@ -27,12 +27,12 @@ compare() {
     found=$(bytes_of "$work/$1")
     [ "$found" = "$expected" ] || { diff <(echo "$expected") <(echo "$found"); exit 1; }
     [ "$(find "$work/$1" -name done | wc -l)" = 8 ] || { echo "$1: not all are done"; exit 1; }
-    echo "$1: the same bytes"
+    echo "$1: identical bytes"
 }
 
 "$work/task" "$work/one"
 expected=$(bytes_of "$work/one")
-[ "$(wc -l <<<"$expected")" = 24 ] || { echo "24 tables were to be written"; exit 1; }
+[ "$(wc -l <<<"$expected")" = 24 ] || { echo "24 tables should have been written"; exit 1; }
 
 # Killed at arbitrary points, and started again.
 for delay in 0.2 0.5 0.9; do
@@ -44,7 +44,7 @@ compare killed
 before=$(find "$work/killed" -name '*.parquet' -newer "$work/task" -printf '%p %T@\n' | sort)
 "$work/task" "$work/killed"
 after=$(find "$work/killed" -name '*.parquet' -newer "$work/task" -printf '%p %T@\n' | sort)
-[ "$before" = "$after" ] || { echo "what was done was done again"; exit 1; }
+[ "$before" = "$after" ] || { echo "finished work was done again"; exit 1; }
 
 start=$SECONDS
 seq 8 1000 | xargs -I {} "$work/task" "$work/none" "--shard={}/1001"
@@ -107,7 +107,7 @@ if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
         sleep 0.5
     done
     scontrol show job "${job}_1" | grep -o 'Restarts=[0-9]*' | grep -x Restarts=1 ||
-        { echo "the task was not killed at work"; exit 1; }
+        { echo "the task was not killed while running"; exit 1; }
     mv "$work/slurm/out" "$work/array"
     compare array
 else

@@ -22,5 +22,5 @@ soak scalar
 if [ "${RAYWAKE_VULKAN:-}" = required ]; then
     soak vulkan --faulty-layer "$layer"
 else
-    echo "skipped: a device that is lost, as none is required"
+    echo "skipped: a lost device, as none is required"
 fi

@@ -103,7 +103,7 @@ impl DroppedReturns {
             ("not_finite", "not finite", self.not_finite),
             ("no_return", "without an echo", self.no_return),
             ("too_far", "too far", self.too_far),
-            ("unknown_sensor", "of an unknown sensor", self.unknown_sensor),
+            ("unknown_sensor", "from an unknown sensor", self.unknown_sensor),
             ("own_vehicle", "on the ego vehicle", self.own_vehicle),
         ]
     }

@@ -72,8 +72,8 @@ buffers! {
     counters: u32 [|_| COUNTERS] "counts and indirect group counts";
     log_odds: i32 [Profile::voxels] "log-odds of every voxel, tenths";
     columns_now: Column [Profile::columns] "columns of this sweep";
-    columns_before: Column [Profile::columns] "columns of the sweep before, in this window";
-    foreground_marks: u32 [Profile::columns] "1 where a column is foreground";
+    columns_before: Column [Profile::columns] "columns of the previous sweep, in this window";
+    foreground_marks: u32 [Profile::columns] "1 if a column is foreground";
     tiles: u32 [|_| TILE + 1] "sums of the tiles of the prefix sum, then of all";
     foreground_index: u32 [Profile::columns] "position of a column in the foreground";
     foreground: u32 [|_| FOREGROUND_MAX] "foreground columns, ascending";
@@ -82,7 +82,7 @@ buffers! {
     target_energy: u32 [Profile::columns] "energy of the winner at every target";
     target_index: u32 [Profile::columns] "foreground index of the winner at every target";
     proposal: Proposal [|_| FOREGROUND_MAX] "flow and energy each foreground column proposes";
-    min_cost: MinCost [|_| FOREGROUND_MAX] "least energy of a foreground column, and where";
+    min_cost: MinCost [|_| FOREGROUND_MAX] "minimum energy of a foreground column, and where";
     counts: u32 [Profile::returns] "updates of each distinct ray in the band";
     offsets: u32 [Profile::returns] "where its updates start";
     count_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum, updates of the band";
@@ -91,7 +91,7 @@ buffers! {
     histograms: u32 [|_| HISTOGRAMS] "digits of each tile";
     digit_offsets: u32 [|_| HISTOGRAMS] "where they go";
     digit_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum";
-    heads: u32 [|_| BAND_UPDATES] "1 where a key is new";
+    heads: u32 [|_| BAND_UPDATES] "1 if a key is new";
     runs: u32 [|_| BAND_UPDATES] "voxels before";
     run_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum, voxels of the band";
 }

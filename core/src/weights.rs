@@ -50,13 +50,13 @@ pub enum WeightsError {
 impl fmt::Display for WeightsError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            WeightsError::Magic => write!(f, "no `raywake-weights 1` file"),
+            WeightsError::Magic => write!(f, "not a `raywake-weights 1` file"),
             WeightsError::Header(name) => write!(f, "header line `{name}` missing or malformed"),
             WeightsError::Checksum => write!(f, "checksum does not match: the file is damaged"),
-            WeightsError::Kind => write!(f, "weights of another kind"),
-            WeightsError::Shape => write!(f, "weights of another shape than the profile needs"),
-            WeightsError::Value(n) => write!(f, "value {n} is missing or no integer below 2^23"),
-            WeightsError::Surplus => write!(f, "more values than the shape has"),
+            WeightsError::Kind => write!(f, "weights of a different kind"),
+            WeightsError::Shape => write!(f, "weights of a different shape than the profile needs"),
+            WeightsError::Value(n) => write!(f, "value {n} missing or not an integer below 2^23"),
+            WeightsError::Surplus => write!(f, "more values than the shape calls for"),
             WeightsError::Range => write!(f, "the sums of the weights are too large"),
         }
     }

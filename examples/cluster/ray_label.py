@@ -47,7 +47,7 @@ def main(listed, out):
                     failed += 1
                     print(error.cause, file=sys.stderr)
     if failed:
-        sys.exit(f"{failed} of {len(paths)} recordings are not labelled")
+        sys.exit(f"{failed} of {len(paths)} recordings failed")
 
 
 if __name__ == "__main__":

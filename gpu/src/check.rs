@@ -32,7 +32,7 @@ fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String>
 
 fn whole(row: &Buffer) -> Result<(), String> {
     let words = row.bytes > 0 && row.bytes.is_multiple_of(4);
-    ensure(words, || format!("{} bytes are not whole words", row.bytes))
+    ensure(words, || format!("{} bytes is not a whole number of words", row.bytes))
 }
 
 fn step(limits: &Limits, table: &[Buffer], op: &Op) -> Result<(), String> {
@@ -56,13 +56,13 @@ fn step(limits: &Limits, table: &[Buffer], op: &Op) -> Result<(), String> {
 }
 
 fn find(table: &[Buffer], index: usize) -> Result<&Buffer, String> {
-    let missing = || format!("there is no buffer {index}, only {}", table.len());
+    let missing = || format!("there is no buffer {index}, the table has {}", table.len());
     table.get(index).ok_or_else(missing)
 }
 
 /// The host may hold a mutable borrow of an upload buffer's contents, so the device must not write.
 fn written(buffer: &Buffer) -> Result<(), String> {
-    ensure(buffer.heap != Heap::Upload, || format!("writes the upload buffer {}", buffer.name))
+    ensure(buffer.heap != Heap::Upload, || format!("writes to the upload buffer {}", buffer.name))
 }
 
 fn shader(limits: &Limits, kernel: &Kernel) -> Result<(), String> {
@@ -94,18 +94,20 @@ fn bound(
     })?;
     let storage = kernel.bindings.iter().filter(|b| !b.uniform).count();
     let most = limits.storage_buffers;
-    ensure(storage <= most as usize, || format!("binds {storage} buffers of {most} allowed"))?;
+    ensure(storage <= most as usize, || {
+        format!("binds {storage} storage buffers, the device allows {most}")
+    })?;
     for (i, (&buffer, binding)) in buffers.iter().zip(kernel.bindings).enumerate() {
         let row = find(table, buffer)?;
         let most = if binding.uniform { UNIFORM_BYTES } else { limits.storage_buffer_bytes };
-        let text = || format!("{} has {} bytes of {most} bindable", row.name, row.bytes);
+        let text = || format!("{} has {} bytes, at most {most} can be bound", row.name, row.bytes);
         ensure(row.bytes <= most, text)?;
         if binding.writes {
             written(row)?;
             // Shaders may assume that what they write is not aliased.
             let mut others = (0..given).filter(|&j| j != i);
             let alone = others.all(|j| buffers[j] != buffer);
-            ensure(alone, || format!("{} is bound twice and written", row.name))?;
+            ensure(alone, || format!("{} is bound twice and written to", row.name))?;
         }
     }
     Ok(())
@@ -115,7 +117,7 @@ fn counts(limits: &Limits, table: &[Buffer], groups: &Groups) -> Result<(), Stri
     match *groups {
         Groups::Fixed(counts) => {
             let fits = counts.iter().zip(&limits.workgroups).all(|(n, max)| n <= max);
-            ensure(fits, || format!("{counts:?} groups of {:?} allowed", limits.workgroups))
+            ensure(fits, || format!("{counts:?} groups, the device allows {:?}", limits.workgroups))
         }
         Groups::Indirect { buffer, offset_bytes: offset } => {
             let row = find(table, buffer)?;

@@ -31,7 +31,7 @@ pub enum GpuError {
         bytes: u64,
     },
     /// The device was lost. Final.
-    #[error("device lost during {during}, says {call}")]
+    #[error("device lost during {during}, reported by {call}")]
     DeviceLost {
         /// The function that reported it.
         call: &'static str,
@@ -39,7 +39,7 @@ pub enum GpuError {
         during: During,
     },
     /// A run missed its deadline. Final, because the device may still be running it.
-    #[error("no end of {during} within {after:?}")]
+    #[error("{during} did not finish within {after:?}")]
     Timeout {
         /// How far the program got.
         during: During,
@@ -47,13 +47,13 @@ pub enum GpuError {
         after: Duration,
     },
     /// The work done beside the device panicked, so the device was not waited for. Final.
-    #[error("`{program}` was abandoned")]
+    #[error("`{program}` was abandoned: the work beside it panicked")]
     Abandoned {
         /// The program's name.
         program: &'static str,
     },
     /// The results of a program are impossible. Final.
-    #[error("`{program}` left nonsense behind: {what}")]
+    #[error("`{program}` left invalid results behind: {what}")]
     Nonsense {
         /// The program's name.
         program: &'static str,

@@ -33,7 +33,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 fn give_up(groups: u32) -> Option<Duration> {
     let mut gpu = slow(groups)?;
     if gpu.info().kind != DeviceKind::Cpu {
-        eprintln!("skipped: too fast a device to be late for sure");
+        eprintln!("skipped: the device is too fast to be sure of missing the deadline");
         return None;
     }
     let begin = Instant::now();

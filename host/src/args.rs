@@ -42,7 +42,7 @@ Exit codes:
     3  an input file is missing, unreadable or invalid
     4  an output file cannot be written
     5  Vulkan device error
-    6  more memory than `budget --limit` allows, or than there is
+    6  more memory needed than `budget --limit` allows or the machine has
   130  interrupted; results so far are kept";
 
 /// Temporal scene flow from LIDAR sweeps and poses.

@@ -99,7 +99,7 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     let (shard, quiet) = (*shard, *quiet);
     let Some(list) = list else { return command.carry_out() };
     if let Some(option) = command.single_file() {
-        let what = format!("--{option} is for one recording, not for those of --list");
+        let what = format!("--{option} is for a single recording and cannot be used with --list");
         return Err(Error::Usage(what).into());
     }
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
@@ -148,7 +148,7 @@ impl Tally {
             Ok(Some(false)) => {}
             Ok(None) => {
                 self.before += 1;
-                return Some("done before\n");
+                return Some("already done\n");
             }
             Err(e) => {
                 let (text, path) = (e.to_string(), at.data.display().to_string());
@@ -162,7 +162,7 @@ impl Tally {
 
     fn line(&self) -> String {
         let Tally { done, before, failures } = self;
-        format!("\n{done} done, {before} done before, {} failed\n", failures.len())
+        format!("\n{done} done, {before} already done, {} failed\n", failures.len())
     }
 
     fn end(self) -> Result<(), RunError> {
@@ -228,7 +228,7 @@ fn listed(list: &Path) -> Result<Vec<ListedRecording>, Error> {
         }
         let wrong = |what: &str| Error::input(list, format!("line {n}"), format!("{line}: {what}"));
         let data = PathBuf::from(line);
-        let place = place(&data).ok_or_else(|| wrong("`..` leads out of the results"))?;
+        let place = place(&data).ok_or_else(|| wrong("`..` leads out of the output folder"))?;
         if let Err(e) = data.metadata() {
             return Err(wrong(&e.to_string()));
         }

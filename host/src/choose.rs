@@ -157,7 +157,7 @@ fn table(list: &[DeviceInfo]) -> String {
 
 /// Printed below a table that contains CPUs.
 const CPU_NOTE: &str =
-    "A CPU stands in for a GPU in tests: the scalar backend finds the same flow in less time.\n";
+    "Vulkan on a CPU is meant for tests: the scalar backend computes the same flow in less time.\n";
 
 /// First major version of Mesa taken to gather. Without AVX-512, older ones read memory lane by
 /// lane: 22.3.6 does, 25.0.7 does not.
@@ -167,8 +167,8 @@ const GATHERING_MESA: u32 = 23;
 /// and 32 with the scalar backend (2 cores of an AMD EPYC, Zen 3, medians of 5 to 11 runs).
 fn of_old_mesa(version: &str) -> String {
     format!(
-        "Mesa {version} reads memory lane by lane where the processor has no AVX-512: with 25.0.7 \
-         a sweep takes half the time.\n"
+        "Mesa {version} reads memory lane by lane on processors without AVX-512: with 25.0.7 a \
+         sweep takes half the time.\n"
     )
 }
 

@@ -63,12 +63,12 @@ pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<
 }
 
 fn no_profile(name: &str) -> String {
-    format!("no profile `{name}`: there are hdl64, wide, far and dissertation")
+    format!("no profile `{name}`: available are hdl64, wide, far and dissertation")
 }
 
 /// Sets a parameter from `name=value` or `group.name=value`. The profile's name gets an asterisk.
 fn assign(settings: &mut Settings, assignment: &str) -> Result<(), String> {
-    let to = ParameterSetting::parse(assignment).ok_or("NAME=VALUE is needed")?;
+    let to = ParameterSetting::parse(assignment).ok_or("expected NAME=VALUE")?;
     set(settings, &to)?;
     if to.group != Some(OBJECTS) && !settings.profile.name.ends_with('*') {
         // If there is no room for it, the name stays as it is.
@@ -104,7 +104,7 @@ fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Res
     match found[..] {
         [] => Err(format!("there is no parameter `objects.{path}` (see PARAMETERS.md)")),
         [(_, set)] => set.map_err(|must| format!("`{name}` must be {must}")),
-        [(a, _), (b, _), ..] => Err(format!("`{a}.{name}` or `{b}.{name}`?")),
+        [(a, _), (b, _), ..] => Err(format!("ambiguous: `{a}.{name}` or `{b}.{name}`?")),
     }
 }
 
@@ -118,7 +118,7 @@ fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, E
     let word = |key: &'static str, default| match table.get(key).map(|v| v.get_ref()) {
         None => Ok(default),
         Some(DeValue::String(word)) => Ok(word.as_ref()),
-        Some(_) => Err(Error::input(path, format!("key `{key}`"), "must be a text")),
+        Some(_) => Err(Error::input(path, format!("key `{key}`"), "must be a string")),
     };
     let base = word("base", "hdl64")?;
     let profile =
@@ -130,7 +130,7 @@ fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, E
     for (key, value) in table.iter().filter(|(k, _)| !["base", "name"].contains(&&**k.get_ref())) {
         let mut put = |group, key: &Spanned<Cow<str>>, value: &DeValue| {
             let mut one = |name: &str, value: &DeValue| {
-                let value = value_of(value).ok_or_else(|| format!("`{name}` is no value"));
+                let value = value_of(value).ok_or_else(|| format!("`{name}` has the wrong type"));
                 value
                     .and_then(|value| set(&mut settings, &ParameterSetting { group, name, value }))
                     .map_err(|e| Error::input(path, line(key.span().start), e))

@@ -124,12 +124,12 @@ impl SpeedErrors {
         match (Spread::of(&self.speed_mps), Spread::of(&self.velocity_mps)) {
             (Some(speed), Some(velocity)) => format!(
                 "accuracy   median speed error {:.2} m/s, median velocity error {:.2} m/s over {} \
-                 columns of moving objects seen {AGE} times or more\n",
+                 columns of moving objects seen at least {AGE} times\n",
                 speed.median,
                 velocity.median,
                 self.speed_mps.len()
             ),
-            _ => "accuracy   no column of a moving object was followed long enough\n".into(),
+            _ => "accuracy   no column of a moving object was tracked long enough\n".into(),
         }
     }
 }

@@ -136,7 +136,7 @@ impl Drive {
         }
         match (step(parts, sweep, before, timer), spare) {
             (Err(RunError::Device(failure)), Some(spare)) => {
-                warn(&format!("device: {failure}: going on with the scalar backend"));
+                warn(&format!("device: {failure}: continuing on the scalar backend"));
                 let failover = failover.insert(Failover { failure, parts: spare.parts() });
                 step(&mut failover.parts, sweep, &[], timer)
             }

@@ -15,10 +15,10 @@ pub enum RunError {
     #[error("{}", device(.0))]
     Device(#[from] GpuError),
     /// Memory was allocated within a sweep.
-    #[error("a defect of this program: {0}")]
+    #[error("internal error: {0}")]
     Allocation(#[from] Allocation),
     /// More memory than the system provides.
-    #[error("{} needed, which the system does not give", console::bytes(*.bytes))]
+    #[error("{} needed, which the system cannot provide", console::bytes(*.bytes))]
     NoMemory {
         /// Bytes needed.
         bytes: u64,

@@ -220,7 +220,7 @@ impl LocatedSweeps {
         match self.poses {
             PoseUse::Find => self.line(),
             PoseUse::Replace => format!(
-                "{}too much: registration goes on instead (--trust-poses keeps them)\n{}",
+                "{}too much: using registration instead (--trust-poses keeps the poses)\n{}",
                 self.differences(),
                 self.line()
             ),
@@ -228,17 +228,17 @@ impl LocatedSweeps {
                 "poses: used unchecked, as the first sweeps show too little\n".into()
             }
             _ if self.disagreement_m > Some(DISAGREEMENT_MAX_M) => format!(
-                "{}all one way: they are used; if they are wrong, --poses register\n",
+                "{}all in one direction: the poses are used; if wrong, use --poses register\n",
                 self.differences()
             ),
-            _ => format!("{}they are used\n", self.differences()),
+            _ => format!("{}the poses are used\n", self.differences()),
         }
     }
 
     fn differences(&self) -> String {
         let centimetres = 100.0 * self.disagreement_m.unwrap_or(0.0);
         format!(
-            "poses: first steps by them and by registration differ by {centimetres:.1} cm at \
+            "poses: the first steps by poses and by registration differ by {centimetres:.1} cm at \
              {AWAY_M:.0} m, "
         )
     }
@@ -248,7 +248,7 @@ impl LocatedSweeps {
         let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
         let doubt = match degenerate {
             0 => "",
-            _ => "degenerate sweeps do not show how far the vehicle went: poses may be far off\n",
+            _ => "degenerate sweeps do not show how far the vehicle moved: poses may be far off\n",
         };
         format!(
             "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; \

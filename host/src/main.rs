@@ -18,7 +18,7 @@ fn explain(e: &clap::Error) -> ! {
     if let Some(path) = first.filter(|_| e.kind() == ErrorKind::InvalidSubcommand) {
         let path = Path::new(&path).display();
         warn(&format!(
-            "a command is missing; to see what moves in it:\n\n    \
+            "a command is missing; to see what moves in this recording:\n\n    \
              raywake run {path} --out results --png\n"
         ));
         std::process::exit(e.exit_code());

@@ -152,7 +152,7 @@ impl Outputs {
         if self.pictures.are_wanted() {
             let (columns, profile, frame) = (flows.columns, &self.profile, self.kinds.frame);
             let moving = flows.points.iter().filter(|p| p.status == Status::Moving).count();
-            let figures = [("moving returns", moving as f64), ("ms a sweep", ms)];
+            let figures = [("moving returns", moving as f64), ("ms per sweep", ms)];
             self.pictures.write(first, &Subject::Flow { columns, profile, frame }, &figures)?;
         }
         let Some(root) = &self.root else { return Ok(()) };

@@ -29,7 +29,7 @@ fn write(out: &mut String, s: &RunSummary) -> std::fmt::Result {
         s.facts.vulkan_allocations
     )?;
     if let Some(failure) = &s.facts.device_failure {
-        writeln!(out, "device     {failure}: the scalar backend went on")?;
+        writeln!(out, "device     {failure}: the scalar backend took over")?;
     }
     if let Some(messages) = &s.facts.validation_messages {
         writeln!(out, "validation {} messages", messages.len())?;
@@ -40,7 +40,7 @@ fn write(out: &mut String, s: &RunSummary) -> std::fmt::Result {
 
 fn times(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let Some(total) = &s.total_ms else {
-        return writeln!(out, "no pair of consecutive sweeps: no flow, no times");
+        return writeln!(out, "no pair of consecutive sweeps, thus neither flow nor times");
     };
     let names = s.stage_ms.0.iter().map(|(name, _)| name.len());
     let width = names.max().unwrap_or(0).max(5);

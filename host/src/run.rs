@@ -30,7 +30,7 @@ fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
         quiet: args.quiet,
     };
     if plan.files.is_empty() && plan.summary.is_none() {
-        let what = "nothing will be written, only measured: --out, --mcap, --film or --page do";
+        let what = "no output, only timings: to write, use --out, --mcap, --film or --page";
         note(plan.quiet, [&what.to_owned()])?;
     }
     engine::execute(&plan, source.as_mut(), &mut |_, _| ())

@@ -93,7 +93,7 @@ fn different(root: &Path, there: &str, here: &str) -> Error {
     let told = lines.filter(|(a, b)| a != b).take(LINES_TOLD);
     let told: Vec<String> = told.map(|(a, b)| format!("`{a}`, not `{b}`")).collect();
     Error::Usage(format!(
-        "{} holds other results: its {NAME} has {}; choose another folder, or delete it",
+        "{} holds other results: its {NAME} has {}; choose another folder, or delete this one",
         root.display(),
         told.join(", ")
     ))

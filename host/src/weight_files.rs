@@ -96,7 +96,7 @@ impl WeightFiles {
         match file.and_then(|f| f.path.as_ref()) {
             Some(path) => Error::input(path, "", e.to_string()),
             None => Error::Usage(format!(
-                "the built-in weights do not fit profile `{}` of {} levels ({e}): give {option}",
+                "the built-in weights do not fit profile `{}` with {} levels ({e}): use {option}",
                 profile.name, profile.levels
             )),
         }

@@ -83,14 +83,14 @@ fn many_recordings() {
     let first = with(&["--shard", "0/2"]);
     first.succeeded();
     assert!(first.stdout.contains("part 0 of 2: 1 of 1 recordings"), "{}", first.stdout);
-    assert!(first.stdout.contains("1 done, 0 done before, 0 failed"), "{}", first.stdout);
+    assert!(first.stdout.contains("1 done, 0 already done, 0 failed"), "{}", first.stdout);
     let place = out.join(drive.strip_prefix("/").unwrap());
     assert!(place.join("done").is_file() && place.join("summary.json").is_file());
     assert!(with(&["--quiet"]).stdout.is_empty());
-    assert!(with(&[]).stdout.contains("0 done, 1 done before"));
+    assert!(with(&[]).stdout.contains("0 done, 1 already done"));
     with(&["-n", "9", "--filter", "none"]).failed(2, &["holds other results"]);
     with(&["--set", "side=100"]).failed(2, &["must be odd"]);
-    with(&["--mcap", "x.mcap"]).failed(2, &["--mcap is for one recording"]);
+    with(&["--mcap", "x.mcap"]).failed(2, &["--mcap is for a single recording"]);
     with(&["--shard", "2/2"]).failed(2, &["0 to N-1"]);
     raywake(&["run", "--list", list]).failed(2, &["--out"]);
     raywake(&["run", list, "--shard", "0/2"]).failed(2, &["--list"]);
@@ -331,7 +331,7 @@ fn completions_and_manual_pages() {
 fn a_run_for_nothing_says_so() {
     let t = Temp::new();
     t.drive(2);
-    let says = "nothing will be written, only measured";
+    let says = "no output, only timings";
     assert!(run(&t, &[]).stdout.contains(says));
     let out = t.path().join("o");
     assert!(!run(&t, &["-o", out.to_str().unwrap()]).stdout.contains(says));

@@ -163,7 +163,7 @@ fn in_a_run_the_scalar_backend_goes_on() {
             let fault = format!("{name} {call} {result}");
             let (out, s, stderr) = results(&format!("{failing} {n}"), &fault, 0);
             assert!(s["device_failure"].as_str().unwrap().contains(told), "{fault}: {s}");
-            assert!(stderr.contains(told) && stderr.contains("going on with the scalar backend"));
+            assert!(stderr.contains(told) && stderr.contains("continuing on the scalar backend"));
             assert_eq!(tables(&out, failing), wanted, "{fault}");
             // Both backends are held then.
             assert!(s["host_bytes"].as_u64() > host_bytes.map(|bytes| 2 * bytes), "{fault}: {s}");

@@ -214,7 +214,7 @@ fn clouds_that_tell_nothing() {
         .map(|n| [(n % 200) as f32 * 0.2 - 20.0, (n / 200) as f32 * 0.2 - 20.0, -1.7])
         .collect();
     let floor = t.write("floor.bin", bin(&floor));
-    refused(&floor, &floor, &["floor.bin", "leaves 3 of the 3 motions on the ground"]);
+    refused(&floor, &floor, &["floor.bin", "leaves 3 of the 3 degrees of freedom on the ground"]);
 }
 
 fn ply(cloud: &[[f32; 3]]) -> Vec<u8> {

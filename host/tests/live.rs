@@ -209,7 +209,7 @@ fn a_device_that_fails() {
             return;
         }
         o.succeeded();
-        assert!(o.stderr.contains("going on with the scalar backend"), "{}", o.stderr);
+        assert!(o.stderr.contains("continuing on the scalar backend"), "{}", o.stderr);
         let s = o.summary(&t.path().join("s.json"));
         assert!(s["device_failure"].as_str().unwrap().contains(told), "{s}");
         assert_eq!(s["backend"], "vulkan");
@@ -232,7 +232,7 @@ fn a_full_disk() {
         mcap.display()
     );
     let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
-    o.failed(4, &["street.mcap", "nothing is recorded any more"]);
+    o.failed(4, &["street.mcap", "recording stopped"]);
     let s = o.summary(&t.path().join("s.json"));
     accounted(&s);
     assert!(s["recording_failure"].as_str().is_some() && !mcap.exists());
@@ -290,7 +290,7 @@ fn a_signal_ends_it() {
             assert!((s["turn_ms"].as_f64().unwrap() - 75.0 * 1.327).abs() < 0.1, "{s}");
             assert!(s["sender"] == "127.0.0.1" && count(&s, "packets", "foreign") == 0, "{s}");
         } else {
-            assert!(o.stdout.contains("no whole sweep arrived"), "{}", o.stdout);
+            assert!(o.stdout.contains("no complete sweep arrived"), "{}", o.stdout);
         }
     }
 }

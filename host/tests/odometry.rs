@@ -49,7 +49,7 @@ fn poses_are_found_and_of_use() {
     assert_eq!(digest(&without), digest(&register));
     let given = run(&["--poses", &poses]);
     given.succeeded();
-    assert!(given.stdout.contains("they are used"), "{}", given.stdout);
+    assert!(given.stdout.contains("the poses are used"), "{}", given.stdout);
     assert!(!given.stdout.contains("registration:"), "{}", given.stdout);
     let trusted = run(&["--poses", &poses, "--trust-poses"]);
     assert!(!trusted.stdout.contains("poses:"), "{}", trusted.stdout);
@@ -73,10 +73,10 @@ fn poses_that_are_given() {
         o
     };
     let good = run("good.txt", &|_| 0.0, &[]);
-    assert!(good.stdout.contains("they are used"), "{}", good.stdout);
+    assert!(good.stdout.contains("the poses are used"), "{}", good.stdout);
     let noisy = |n: usize| if n.is_multiple_of(2) { 0.015 } else { -0.015 };
     let poor = run("poor.txt", &noisy, &[]);
-    let words = "too much: registration goes on instead";
+    let words = "too much: using registration instead";
     assert!(
         poor.stdout.contains(words) && poor.stdout.contains("13 sweeps located"),
         "{}",
@@ -86,7 +86,7 @@ fn poses_that_are_given() {
     assert!(!kept.stdout.contains("registration"), "{}", kept.stdout);
     assert_ne!(digest(&poor), digest(&kept));
     let slipping = run("slipping.txt", &|n| 0.05 * n as f64, &[]);
-    assert!(slipping.stdout.contains("all one way: they are used"), "{}", slipping.stdout);
+    assert!(slipping.stdout.contains("one direction: the poses are used"), "{}", slipping.stdout);
 }
 
 #[test]

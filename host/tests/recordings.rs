@@ -71,7 +71,7 @@ fn a_recording_is_cleaned() {
         assert!(kept[0] > 100 && kept.iter().sum::<u64>() <= labels, "{n}: {kept:?} of {labels}");
     }
     let onto_itself = ["clean", drive.to_str().unwrap(), "-o", drive.to_str().unwrap()];
-    raywake(&onto_itself).failed(2, &["is an input, which would be lost"]);
+    raywake(&onto_itself).failed(2, &["is an input, which would be overwritten"]);
     raywake(&["clean", drive.to_str().unwrap(), "-o", "x", "--voxel", "0"]).failed(2, &["--voxel"]);
 }
 

@@ -32,7 +32,7 @@ fn too_little_memory_is_told_before_the_first_sweep() {
     ] {
         let line = format!("ulimit -v {kib}; exec {program} {command}");
         let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
-        o.failed(6, &["MB needed, which the system does not give"]);
+        o.failed(6, &["MB needed, which the system cannot provide"]);
     }
 }
 

@@ -41,7 +41,7 @@ pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &
     // not check for it. A break out of a loop with a barrier is not detected here either: the
     // bounds of such loops are constants.
     if has_conditional_barrier(&entry.function.body, false) {
-        fail("a barrier under a condition, or behind an early return".into());
+        fail("a barrier under a condition or after an early return".into());
     }
     for (_, function) in module.functions.iter() {
         if has_conditional_barrier(&function.body, false) {

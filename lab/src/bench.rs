@@ -86,7 +86,7 @@ fn settings(names: &[String]) -> Result<Vec<Setting>, Error> {
     let known = || SETTINGS.map(|(name, ..)| name).join(", ");
     let find = |name: &String| {
         let found = SETTINGS.iter().find(|(known, ..)| known == name).copied();
-        found.ok_or_else(|| Error::Usage(format!("--setting `{name}` is none of {}", known())))
+        found.ok_or_else(|| Error::Usage(format!("--setting `{name}` is not one of {}", known())))
     };
     names.iter().map(find).collect()
 }

@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         let device = program.run(before, &vulkan)?;
         let scalar = program.run(before, &[&common[..], &["scalar"]].concat())?;
         let other = device.text("digest") != scalar.text("digest");
-        let failure = other.then_some("other results").or(device.get("device_failure"));
+        let failure = other.then_some("different results").or(device.get("device_failure"));
         if let Some(what) = failure {
             return Err(Error::Usage(format!("{name}, {}: {what}", device.text("device"))));
         }
@@ -94,7 +94,7 @@ fn on_device() -> Vec<&'static str> {
 
 fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results, Error> {
     let name = profiles.first().map_or("", |both| both.device.text("device"));
-    let mut report = Report::new("A Vulkan device and the CPU alone", "Side by side, one digest");
+    let mut report = Report::new("A Vulkan device and the CPU alone", "Side by side, same digest");
     report.fact("Device", name);
     report.fact("Sweeps of a run", &args.sweeps.to_string());
     let tables = [totals("profiles", "profile", profiles)?, totals("threads", "cores", threads)?];

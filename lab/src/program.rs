@@ -55,7 +55,8 @@ impl ProgramBuild<'_> {
             return Err(failed(String::from_utf8_lossy(&done.stderr).trim().to_owned()));
         }
         let times = String::from_utf8_lossy(&done.stdout).into_owned();
-        let cpu_s = cpu_s(&times).ok_or_else(|| failed(format!("`times` says {times}")))?;
+        let cpu_s = cpu_s(&times)
+            .ok_or_else(|| failed(format!("unexpected output of `times`: {times}")))?;
         let summary = serde_json::from_str(&whole::read_text(&file)?)
             .map_err(|e| Error::input(&file, format!("line {}", e.line()), e.to_string()))?;
         Ok(Ran { summary, cpu_s, wall_s, file })
@@ -68,7 +69,7 @@ impl Ran {
     /// # Errors
     /// If there was no pair of sweeps.
     pub fn total_ms(&self, figure: &str) -> Result<f64, Error> {
-        let none = || Error::input(&self.file, "", "no pair of sweeps, no time");
+        let none = || Error::input(&self.file, "", "no pair of sweeps, so no times");
         self.summary["total_ms"][figure].as_f64().ok_or_else(none)
     }
 

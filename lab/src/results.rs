@@ -45,7 +45,7 @@ fn read(path: &Path) -> Result<Results, Error> {
     for table in &results.tables {
         let columns = table.columns.len();
         if table.rows.iter().any(|row| row.cells.len() != columns) {
-            let what = format!("a row of table {} lacks some of {columns} cells", table.id);
+            let what = format!("a row of table {} does not have {columns} cells", table.id);
             return Err(Error::input(&file, "", what));
         }
     }

@@ -14,7 +14,7 @@ raywake_core::params! {
         pub climb_sigma_mps: f64 = 0.1, "m/s", (above 0), "Dissertation, section 2.6.2.";
         /// Of the turn rate.
         pub turn_rate_sigma_radps: f64 = 0.08165, "rad/s", (above 0),
-            "Dissertation, section 2.6.2; the estimate has 0.15: town traffic turns into a bend \
+            "Dissertation, section 2.6.2; the estimate uses 0.15: town traffic enters a bend \
              within a second.";
     }
 }

@@ -200,7 +200,7 @@ pub trait Parameters {
 #[macro_export]
 macro_rules! params {
     // The reason for a default.
-    (@why) => { "Not measured on its own." };
+    (@why) => { "Not measured in isolation." };
     (@why $why:expr) => { $why };
     // A range.
     (@bounds any) => {

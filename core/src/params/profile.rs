@@ -46,7 +46,7 @@ crate::params! {
         /// Edge of a voxel.
         pub voxel_m: f64 = 0.30, "m", (0.05 to 2.0),
             "Dissertation, section 3.8.1 and table B.1 (r). Cells of 0.20 m in a window of 38 m: \
-             3.3 cm mean error of what moves against 4.0 cm (`raywake-lab ablate`).";
+             3.3 cm mean error of movers against 4.0 cm (`raywake-lab ablate`).";
         /// Maximum number of returns taken from a sweep; one with more is thinned evenly to this
         /// many.
         pub returns_max: u32 = POINTS_MAX as u32, "returns", (1 to 262144),
@@ -56,28 +56,28 @@ crate::params! {
         pub range_m: f64 = 100.0, "m", (above 0), "Dissertation, table B.1 (m_r).";
         /// Frame of the grid.
         pub frame: Frame = Frame::Lattice, "", (any),
-            "What is static then has displacement zero exactly.";
+            "Static structure then has exactly zero displacement.";
         /// Whether returns of a distorted source are moved to the stamp.
         pub deskew: bool = true, "", (any),
-            "Without: 4.8 cm mean error of what moves against 4.4 cm (`raywake-lab ablate`).";
+            "Without it: 4.8 cm mean error of movers against 4.4 cm (`raywake-lab ablate`).";
         /// Rounds of expectation and maximisation (n_em).
         pub em_rounds: u32 = 6, "", (1 to 100),
-            "20 rounds bring half a point within 30 cm: the refinement makes little of more \
+            "20 rounds gain half a point within 30 cm: the refinement gains little from more \
              (`raywake-lab ablate`). Dissertation, section 3.8.1: 20.";
         /// Weight of the smoothing term w_p.
         pub smoothing: u32 = 1000, "millinats per cell²", (0 to 10000),
-            "Dissertation, section 3.8.1. 0 / 0.1 / 3 nats: 8.1 / 4.1 / 4.5 cm mean error of what \
-             moves against 4.4 cm (`raywake-lab ablate`).";
+            "Dissertation, section 3.8.1. 0 / 0.1 / 3 nats: 8.1 / 4.1 / 4.5 cm mean error of \
+             movers against 4.4 cm (`raywake-lab ablate`).";
         /// Cost of displacement.
         pub displacement_cost: u32 = 1, "millinats per cell²", (0 to 1000),
             "The author's program: 0.001.";
         /// Cost of a window neighbour outside the grid.
         pub outside_cost: u32 = COST_UNKNOWN, "millinats", (0 to 100000),
-            "As one that tells nothing: -log 0.5.";
+            "As for an uninformative one: -log 0.5.";
         /// Sweeps whose returns refine the flow below the cell's size: the pair's own two and, of
         /// those before it, every other one; 0 leaves whole cells.
         pub refinement_sweeps: u32 = 5, "sweeps", (0 or 2 to 5),
-            "2 sweeps: 5.8 cm mean error of what moves against 4.4 cm with 3, whole cells 38.8 cm \
+            "2 sweeps: 5.8 cm mean error of movers against 4.4 cm with 3, whole cells 38.8 cm \
              (`raywake-lab ablate`). Recall at a precision of 95 % on simulated outskirts \
              (`--seed 7070`; `vlp32x2`, `hdl32x4-full`): 88.9 and 88.4 % with 3, 90.0 and 88.9 \
              with 5.";
@@ -204,7 +204,7 @@ impl Profile {
             (
                 !refined || self.frame == Frame::Lattice,
                 "refinement_sweeps",
-                "0 where the frame is the sensor's",
+                "0 if the frame is the sensor's",
             ),
             (!self.name.is_empty(), "name", "not empty"),
         ];

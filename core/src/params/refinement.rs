@@ -2,15 +2,15 @@
 
 /// The source of the refinement's constants, unless stated otherwise.
 const SIMULATED: &str = "Chosen on six simulated drives (`raywake-lab sim --drives 6 --sweeps 40 \
-                         --seed 1100`), not measured on its own.";
+                         --seed 1100`), not measured in isolation.";
 /// The source of those that set the spread of covariances.
 const CALIBRATED: &str = "Chosen on sixty simulated drives so that the 68 % and 95 % ellipses hold \
                           75.5 % and 90.4 % of the true displacements.";
 /// The source of those for climbing ground.
-const CLIMBED: &str = "Columns true / false / missed on `kitti_raw_0005` 6,069 / 1,454 / 365 with \
-                       it, 5,972 / 1,401 / 462 where nothing is climbed; simulated streets as \
-                       before. With columns of any thickness and two columns beside, cars become \
-                       ground: recall of streets falls by 1 to 8 points.";
+const CLIMBED: &str = "Columns true / false / missed on `kitti_raw_0005`: 6,069 / 1,454 / 365 with \
+                       climbing, 5,972 / 1,401 / 462 without; simulated streets unchanged. With \
+                       columns of any thickness and two columns to the side, cars become ground: \
+                       recall on streets drops by 1 to 8 points.";
 
 crate::params! {
     /// How the ground is estimated, see [`crate::ground`].
@@ -98,10 +98,10 @@ crate::params! {
         /// A return with at least this residual, or with nothing near it, is judged by the rays
         /// that passed there.
         pub sight_residual: f32 = 0.1, "", (0 to 1),
-            "Columns put out as moving of simulated streets (`raywake-lab sim --drives 3 --sweeps \
+            "Columns reported as moving on simulated streets (`raywake-lab sim --drives 3 --sweeps \
              25 --seed 9001`, slow, plain and fast, `vlp32x2` and `hdl64`, and plain \
              `hdl32x4-full`), with 0.03 for `evidence_min`: precision 95.1 %, recall 94.6 here, \
-             94.8 and 94.6 at 0.05. Before rays told, 94.2 and 94.4.";
+             94.8 and 94.6 at 0.05. Without judging by rays, 94.2 and 94.4.";
         /// How near a ray must pass to a point to count as evidence about it.
         pub sight_distance_m: f64 = 0.1, "m", (0.001 to 5),
             "Precision and recall as above: 95.2 and 94.7 at 0.07 m, 95.1 and 94.7 at 0.15 m.";
@@ -121,38 +121,38 @@ crate::params! {
         pub residual_bad: f32 = 0.3, "", (0 to 1), SIMULATED;
         /// Minimum evidence against rest for a cluster to be dynamic, see [`crate::refinement`].
         pub evidence_min: f32 = 0.02, "", (0 to 1),
-            "So low that what moves is among what P(moves) decides of. Precision and recall as \
+            "So low that P(moves) gets to decide on everything that moves. Precision and recall as \
              above: 95.1 and 94.6 at 0.03, 95.0 and 94.8 here, with 0.03 for `residual_static`.";
         /// Difference in evidence that makes motion e times as likely.
         pub evidence_scale: f32 = 0.04, "", (0.0001 to 1), CALIBRATED;
         /// Share of `evidence_min` and `residual_static` that suffices for a cluster that moved in
         /// the last sweep, or is beside one that moves.
         pub evidence_prior_ratio: f32 = 0.4, "", (0 to 1),
-            "The least that keeps false motion in a still simulated street within its bound.";
+            "The smallest that keeps false motion in a static simulated street within its bound.";
         /// Share of a cluster's columns whose tracklets must have moved for that reduction to apply
         /// in full; with fewer it applies in proportion: a car's tracklets touch the road.
         pub prior_quorum: f32 = 0.5, "", (0.01 to 1),
-            "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before \
-             what stands below was its footprint).";
+            "Without it 4,581 static columns of `kitti_raw_0005` move, with it 2,952 (before the \
+             static ground below a cluster became its footprint).";
         /// Columns whose could-move score (see [`crate::encoder`]) is below this join no moving
         /// cluster, unless most of that cluster is like them and it was seen to arrive.
         pub could_move_min: f32 = -5.5, "nat", (-8 to 8),
-            "So low that P(moves) decides of what the encoder doubts: whole groups of people are \
-             below -4 where it has seen nothing like their place. Recall at a precision of 95 % on \
+            "So low that P(moves) decides if the encoder is in doubt: whole groups of people are \
+             below -4 in surroundings unlike its training. Recall at a precision of 95 % on \
              simulated streets (`raywake-lab sim --drives 3 --sweeps 25 --seed 9001`; slow and \
              plain, `vlp32x2`): 91.0 and 97.4 % at -4, 91.9 and 97.7 here, 91.5 and 97.8 at -8, \
-             each with weights of its own.";
+             each with its own weights.";
         /// Columns whose score is above this and that touch a moving cluster join it if they fit
         /// its motion about as well as rest (`remainder_residual`).
         pub body_min: f32 = 1.0, "nat", (-8 to 8),
             "At 0 precision and recall are the same to 0.1 points on simulated streets as above; \
-             far from movers four HDL-32E on outskirts (`--drives 6 --sweeps 25 --seed 7070`) put \
-             out 649 columns that stand, 528 here.";
+             far from movers, four HDL-32E on outskirts (`--drives 6 --sweeps 25 --seed 7070`) \
+             have 649 false moving columns, 528 here.";
         /// A cluster is static if something was hit in more than this share of looks at its voxels
         /// in sweeps in which, by its motion, it was not there yet.
         pub worn_max: f32 = 0.5, "", (0 to 1),
-            "Of simulated columns that move 2 % are of such clusters, of those that stand far from \
-             any a quarter.";
+            "2 % of simulated moving columns are in such clusters, and a quarter of the static \
+             ones far from any mover.";
         /// Beyond this length a cluster that moved needs less evidence, in inverse proportion: its
         /// sides slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;
@@ -176,7 +176,7 @@ crate::params! {
         /// Columns in which nothing was hit in sweeps that are older by at least this much, as far
         /// as they are remembered, may also belong to a moving part.
         pub part_since_s: f64 = 0.25, "s", (0 to 10),
-            "Columns of people who walk on `kitti_raw_0005` (94), found with a margin of 0: 14 at \
+            "Columns of walking people on `kitti_raw_0005` (94), found with a margin of 0: 14 at \
              10 s, where nothing is remembered, 26 at 0.15 s, 37 here, 33 at 0.4 s.";
         /// How much the evidence of such a part must exceed what the test requires: anything that
         /// comes out of a shadow was not there before either.
@@ -198,8 +198,8 @@ crate::params! {
         pub fragment_distance_m: f64 = 1.2, "m", (0 to 20), SIMULATED;
         /// How far the ground under a moving cluster extends beyond its returns.
         pub footprint_margin_m: f64 = 0.1, "m", (0 to 5),
-            "Of the matched columns of ground beside movers on `kitti_raw_0005`, labelled boxes \
-             hold 589 so near to the returns registered and 65 are others; 467 and 12 at 0 m, 702 \
+            "Of the matched ground columns beside movers on `kitti_raw_0005` this near to the \
+             registered returns, 589 are in labelled boxes and 65 are not; 467 and 12 at 0 m, 702 \
              and 293 at 0.2 m.";
 
         /// Standard deviation of the displacement of a static cluster that fits perfectly.

@@ -2,7 +2,7 @@
 //! kernel.
 //!
 //! As in generalised ICP (Segal, Haehnel and Thrun, RSS 2009) each pair of nearest returns is
-//! weighted by the surface it lies on; the robust kernel (Geman and McClure, 1987) is wide at
+//! weighted by the surface it lies on; the robust kernel (Geman and McClure, 1985) is wide at
 //! first, then narrow. Correspondences run both ways, from the cluster to the other sweeps and from
 //! the second sweep back, so that an end coming into view or leaving it does not bias the result.
 //!

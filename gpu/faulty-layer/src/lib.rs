@@ -45,7 +45,7 @@ fn manifest(library: &Path) -> String {
     format!(
         r#"{{"file_format_version": "1.2.0", "layer": {{"name": "{NAME}", "type": "GLOBAL",
         "library_path": "{}", "api_version": "1.1.0", "implementation_version": "1",
-        "description": "Lets calls fail"}}}}"#,
+        "description": "Makes chosen calls fail"}}}}"#,
         library.display()
     )
 }

@@ -85,7 +85,7 @@ unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<Option<&'a str>, R
     }
     // SAFETY: guaranteed by the caller.
     let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map(Some).map_err(|_| Refusal::invalid(format_args!("`{what}` is no UTF-8")))
+    text.to_str().map(Some).map_err(|_| Refusal::invalid(format_args!("`{what}` is not UTF-8")))
 }
 
 /// Sets a parameter by `NAME=VALUE`.
@@ -180,7 +180,7 @@ impl CreateOptions {
         // SAFETY: guaranteed by the caller.
         let abi = unsafe { options.cast::<u32>().read_unaligned() };
         if abi != RAYWAKE_ABI_VERSION {
-            let why = format_args!("the program has ABI {abi}, the library {RAYWAKE_ABI_VERSION}");
+            let why = format_args!("the program uses ABI {abi}, the library {RAYWAKE_ABI_VERSION}");
             return Err(Refusal::new(CallStatus::OtherAbi, why));
         }
         // SAFETY: guaranteed by the caller.

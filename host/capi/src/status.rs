@@ -42,14 +42,14 @@ pub extern "C" fn raywake_status_text(status: i32) -> *const c_char {
     let text: &CStr = match status {
         0 => c"ok",
         1 => c"a pointer is null",
-        2 => c"an argument is not what it must be",
+        2 => c"an argument is invalid",
         3 => c"compiled with a header of another ABI",
         4 => c"the memory is too small",
         5 => c"the system has no more threads",
         6 => c"there is no estimator at this address",
         7 => c"another thread is in a call with this estimator",
-        8 => c"a defect of the library ended a sweep early",
-        _ => c"no status",
+        8 => c"an internal error ended a sweep early",
+        _ => c"unknown status",
     };
     text.as_ptr()
 }

@@ -142,13 +142,12 @@ impl Column {
             return Err(Refusal::null(what));
         }
         if stride < bytes {
-            let why =
-                format_args!("`{what}_stride` is {stride}: less than the {bytes} bytes of one");
+            let why = format_args!("`{what}_stride` is {stride}: less than {bytes} bytes");
             return Err(Refusal::invalid(why));
         }
         let all = stride.checked_mul(count).filter(|all| *all <= isize::MAX as usize);
         all.ok_or_else(|| {
-            Refusal::invalid(format_args!("`count` times `{what}_stride` is no size"))
+            Refusal::invalid(format_args!("`count` times `{what}_stride` is too large"))
         })?;
         Ok(Column { start: start.cast(), stride })
     }

@@ -41,7 +41,7 @@ impl fmt::Display for CreateError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             CreateError::Profile(e) => write!(f, "parameter `{}` must be {}", e.field, e.must),
-            CreateError::Rig => write!(f, "the rig needs a sensor, and finite places and times"),
+            CreateError::Rig => write!(f, "the rig needs a sensor, and finite positions and times"),
             CreateError::Weights(why) => {
                 write!(f, "the shipped weights do not fit the profile: {why}")
             }

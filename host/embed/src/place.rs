@@ -29,12 +29,12 @@ pub enum SweepError {
 impl fmt::Display for SweepError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            SweepError::Points(most) => write!(f, "a sweep may have {most} returns"),
+            SweepError::Points(most) => write!(f, "a sweep may have at most {most} returns"),
             SweepError::NotFinite => {
                 write!(f, "stamp, pose and twist must be finite, the rotation a unit quaternion")
             }
             SweepError::Pose => {
-                write!(f, "poses are given with every sweep, or found for every sweep")
+                write!(f, "poses must be given with every sweep, or found for every sweep")
             }
         }
     }

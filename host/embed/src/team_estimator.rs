@@ -29,7 +29,7 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             StepError::Sweep(e) => e.fmt(f),
-            StepError::Failed => write!(f, "a defect: a sweep was not finished"),
+            StepError::Failed => write!(f, "internal error: a sweep was not finished"),
         }
     }
 }

@@ -152,7 +152,7 @@ def main():
             try:
                 found = self.flow.step(points, stamp, self.pose(cloud.header))
             except (TransformException, ValueError) as e:
-                self.get_logger().warning(f"cloud left out: {e}")
+                self.get_logger().warning(f"cloud skipped: {e}")
                 return
             header, self.header = self.header, cloud.header
             if found is not None:

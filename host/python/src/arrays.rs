@@ -136,7 +136,7 @@ fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyA
     let kind: String = given.getattr("dtype")?.getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
         let name = given.getattr("dtype")?.str()?;
-        let why = format!("{what}: real numbers are needed, not {name}");
+        let why = format!("{what}: expected real numbers, not {name}");
         return Err(pyo3::exceptions::PyTypeError::new_err(why));
     }
     let single = numpy.getattr("float32")?;
@@ -161,7 +161,7 @@ pub fn points(
     let points: PyReadonlyArray2<f32> = points.extract().map_err(|_| shape(&points))?;
     let [count, width] = [points.shape()[0], points.shape()[1]];
     if width < 3 {
-        return Err(PyValueError::new_err(format!("points have 3 numbers or more, not {width}")));
+        return Err(PyValueError::new_err(format!("points need at least 3 numbers, not {width}")));
     }
     to.clear();
     to.reserve(count);
@@ -187,7 +187,7 @@ pub fn points(
 
 fn shape(points: &Bound<'_, PyAny>) -> PyErr {
     let shape = points.getattr("shape").map(|shape| shape.to_string()).unwrap_or_default();
-    PyValueError::new_err(format!("points: an array of N x 3 is needed, not of {shape}"))
+    PyValueError::new_err(format!("points: expected an N x 3 array, not {shape}"))
 }
 
 fn each(
@@ -196,7 +196,7 @@ fn each(
     what: &str,
     mut set: impl FnMut(&mut Point, f32),
 ) -> PyResult<()> {
-    let wrong = || PyValueError::new_err(format!("{what}: one number is needed per point"));
+    let wrong = || PyValueError::new_err(format!("{what}: expected one number per point"));
     let values: PyReadonlyArray1<f32> = values.extract().map_err(|_| wrong())?;
     if values.len() != to.len() {
         return Err(wrong());

@@ -62,7 +62,7 @@ pub fn flow(
     pose: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<CloudFlow> {
     if !(dt.is_finite() && dt > 0.0) {
-        return Err(PyValueError::new_err("dt must be a time"));
+        return Err(PyValueError::new_err("dt must be positive and finite"));
     }
     let profile = self::profile(profile, settings)?;
     let [mut first, mut second] = [const { Vec::new() }; 2];

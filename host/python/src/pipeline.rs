@@ -128,7 +128,7 @@ impl PyPipeline {
         let place = if let Ok(sweep) = points.cast::<PySweep>() {
             if stamp.or(pose.map(|_| 0.0)).or(time.or(sensor).map(|_| 0.0)).is_some() {
                 return Err(PyTypeError::new_err(
-                    "a Sweep comes with stamp, pose, time and sensor",
+                    "a Sweep already has stamp, pose, time and sensor",
                 ));
             }
             let PySweep { data, located } = sweep.get();
@@ -203,7 +203,7 @@ impl Step {
         }
         let pipeline = self.pipeline.try_borrow(py)?;
         if pipeline.steps != self.number {
-            let why = "the pipeline has gone on: ask for arrays of a step before the next one";
+            let why = "the pipeline has gone on: read the arrays of a step before the next step";
             return Err(PyRuntimeError::new_err(why));
         }
         let array = pipeline.team.read(make).map_err(refused)??;

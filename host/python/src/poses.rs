@@ -21,7 +21,7 @@ fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
 
 /// Reads a pose from a 4x4 or 3x4 matrix, or from x, y, z, qx, qy, qz, qw, whose bits are kept.
 pub fn pose(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Pose> {
-    const WHAT: &str = "a 4x4 or 3x4 matrix, or x, y, z, qx, qy, qz, qw, is needed";
+    const WHAT: &str = "expected a 4x4 or 3x4 matrix, or x, y, z, qx, qy, qz, qw";
     let wrong = |why: &str| PyValueError::new_err(format!("{what}: {why}"));
     let numbers = numbers(value, what)?;
     match numbers[..] {
@@ -33,7 +33,7 @@ pub fn pose(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Pose> {
             let rows = numbers.first_chunk().ok_or_else(|| wrong(WHAT))?;
             match numbers.get(12..) {
                 Some([] | [0.0, 0.0, 0.0, 1.0]) => {
-                    Pose::from_rows(rows).map_err(|_| wrong("its 3x3 part is no rotation"))
+                    Pose::from_rows(rows).map_err(|_| wrong("its 3x3 part is not a rotation"))
                 }
                 _ => Err(wrong(WHAT)),
             }
@@ -47,7 +47,7 @@ pub fn twist(value: &Bound<'_, PyAny>) -> PyResult<Twist> {
         [x, y, z, a, b, c] => {
             Ok(Twist { linear: DVec3::new(x, y, z), angular: DVec3::new(a, b, c) })
         }
-        _ => Err(PyValueError::new_err("twist: vx, vy, vz, wx, wy, wz are needed")),
+        _ => Err(PyValueError::new_err("twist: expected vx, vy, vz, wx, wy, wz")),
     }
 }
 

@@ -69,9 +69,9 @@ impl PyRecording {
     fn __getitem__(&self, py: Python<'_>, index: isize) -> PyResult<PySweep> {
         let from_end = if index < 0 { self.length as isize } else { 0 };
         let index = usize::try_from(index + from_end).ok().filter(|n| *n < self.length);
-        let index = index.ok_or_else(|| PyIndexError::new_err("there is no such sweep"))?;
+        let index = index.ok_or_else(|| PyIndexError::new_err("sweep index out of range"))?;
         py.detach(|| {
-            let poisoned = |_| PyRuntimeError::new_err("a sweep could not be read before");
+            let poisoned = |_| PyRuntimeError::new_err("reading an earlier sweep failed");
             let mut source = self.source.lock().map_err(poisoned)?;
             let mut sweep = SweepData::default();
             source.read(index, &mut sweep).map_err(failed)?;

@@ -39,7 +39,9 @@ impl PyRig {
             "stamp" => Timing::AtStamp,
             "offset" => Timing::Offset { from_s: start, span_s: span },
             "azimuth" => Timing::Azimuth { span_s: span },
-            _ => return Err(PyValueError::new_err("timing: stamp, offset or azimuth")),
+            _ => {
+                return Err(PyValueError::new_err("timing must be 'stamp', 'offset' or 'azimuth'"));
+            }
         };
         Ok(PyRig(sweep::Rig {
             sensors: places(sensors)?,

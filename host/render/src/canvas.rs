@@ -14,7 +14,7 @@ pub enum PictureError {
     #[error("a picture cannot have {} x {} pixels", .0[0], .0[1])]
     Size([f32; 2]),
     /// An extent that a picture cannot have, m.
-    #[error("a picture cannot reach {0} m")]
+    #[error("a picture cannot cover {0} m")]
     Extent(f32),
 }
 

@@ -5,23 +5,23 @@ use std::path::PathBuf;
 use super::{FlowChoice, Recording, Recordings, Selection};
 
 const ABOUT: &str = "\
-Remove what moves from a recording: labels, clouds and a map of what stands
+Remove moving objects from a recording: labels, clouds and a map of the static scene
 
-The flow of every sweep is found twice, forwards and backwards in time. What is kept in memory are \
-60 kB a sweep of 120,000 returns, and the map. Then all sweeps are written, in their order.";
+The flow of every sweep is computed twice, forwards and backwards in time; then all sweeps are \
+written in order. Memory grows by 60 kB per sweep of 120,000 returns, and with the map.";
 
 const FILES: &str = "\
 Files of --out DIR:
     labels/FRAME.label   SemanticKITTI's labels of moving object segmentation, one per return of
-                         the input: 251 moving, 9 static, 0 neither (outside the window, no
-                         surface)
-    static/FRAME.bin     what does not move, as the recording's clouds are: .bin (little-endian
-                         float32 x, y, z, intensity), .npy, .pcd, .ply or .feather, in the vehicle
-                         frame; returns outside the window, too. Of an MCAP file or a capture:
+                         the input: 251 moving, 9 static, 0 neither (outside the window, or
+                         not a surface)
+    static/FRAME.bin     returns that do not move, also those outside the window, in the vehicle
+                         frame and the recording's own format: .bin (little-endian float32 x, y, z,
+                         intensity), .npy, .pcd, .ply or .feather. For an MCAP file or a capture:
                          static.mcap, with /points and /tf
-    moving/FRAME.bin     what moves; or moving.mcap
-    map.ply              what stands, in the world of the poses: a point per voxel in which more
-                         returns were static than moving";
+    moving/FRAME.bin     returns that move; or moving.mcap
+    map.ply              the static scene in the world frame of the poses: one point per voxel in
+                         which more returns were static than moving";
 
 #[derive(Clone, Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]

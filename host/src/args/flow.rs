@@ -23,14 +23,14 @@ Columns of --out FILE.feather, one row per point of A in file order, including i
     flow_x_m flow_y_m flow_z_m       its position in B's frame minus its position in A's frame
     motion_x_m motion_y_m motion_z_m motion over ground (ego motion removed), along A's axes
     cov_dx_dx cov_dx_dy cov_dy_dy    covariance of the motion, m^2; 0 where unmatched
-    foreground                       may move: not rejected by the background filter
+    foreground                       could move: not rejected by the background filter
     valid                            matched, or part of a moving cluster
     status                           what became of the point, by number: static, moving, unmatched,
                                      outside window, over capacity, own vehicle, no echo, invalid
-Flow and motion are NaN where a coordinate is. FILE.bin has flow and motion only: 6 little-endian
+Flow and motion are NaN if a coordinate is. FILE.bin has flow and motion only: 6 little-endian
 float32 per row. The metadata of the feather file has dt_s, ground_m and a_from_b, the estimated
 motion (a row-major 3x4 matrix: the pose of B's frame in A's).
-Only points that move have a motion. Of a cloud of more points than";
+Only moving points have a motion. A cloud is thinned evenly to at most";
 
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
@@ -77,7 +77,7 @@ pub struct FlowArgs {
 
 /// Text at the end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
-    format!("{FILES} {POINTS_MAX} as many are taken, evenly spread.\n\n{exit_codes}")
+    format!("{FILES} {POINTS_MAX} points.\n\n{exit_codes}")
 }
 
 /// Parses three finite numbers separated by commas.

@@ -33,7 +33,7 @@ pub fn spare(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
     let harm = input.and_then(|input| harm(&resolved(output), &input));
     harm.map_or(Ok(()), |what| {
         let place = output.display();
-        Err(Error::Usage(format!("--{option} {place} {what}: choose another place")))
+        Err(Error::Usage(format!("--{option} {place} {what}: choose another path")))
     })
 }
 
@@ -56,7 +56,7 @@ fn resolved(output: &Path) -> PathBuf {
 /// a folder that is new, empty or already holds results.
 fn harm(output: &Path, input: &Path) -> Option<&'static str> {
     if output == input {
-        return Some("is an input, which would be lost");
+        return Some("is an input, which would be overwritten");
     }
     if !output.starts_with(input) {
         return None;
@@ -64,7 +64,7 @@ fn harm(output: &Path, input: &Path) -> Option<&'static str> {
     let is_empty = |folder: &Path| folder.read_dir().is_ok_and(|mut list| list.next().is_none());
     let of_results = |folder: &Path| is_empty(folder) || folder.join(settings_file::NAME).is_file();
     match output {
-        output if output.is_file() => Some("is in the recording already"),
+        output if output.is_file() => Some("is already in the recording"),
         output if output.is_dir() && !of_results(output) => Some("is a folder of the recording"),
         _ => None,
     }

@@ -14,15 +14,15 @@ use super::results::StreamArgs;
 use super::values::{count, factor, listen, milliseconds, vehicle_box};
 
 const ABOUT: &str = "\
-Estimate the scene flow of a sensor's packets as they come
+Estimate scene flow live from a sensor's packets
 
-Every sweep is worked on as soon as its last packet is there. Of sweeps that come while one is in \
-hand the newest is kept; older ones are left out and counted. Nothing else is made cheaper: with a \
-third of the rounds of the energy minimisation, or of the steps of the refinement, a sweep takes \
-95 % of its time, where one left out takes none. Tracks go on over a sweep that is missing. A \
-device that fails, or does not answer within ten deadlines, is given up, and the CPU goes on. \
-Messages are written by a thread of their own, and those that it has no time for are left out. \
-SIGINT or SIGTERM end it. Under systemd it says when it is ready, and that it is alive.";
+Every sweep is processed as soon as its last packet has arrived. Of the sweeps that arrive during \
+that time only the newest is kept; older ones are dropped and counted. The work per sweep is not \
+reduced under load: a third of the rounds of the energy minimisation, or of the steps of the \
+refinement, would still take 95 % of the time. Tracks continue across a missing sweep. A device \
+that fails, or does not answer within ten deadlines, is abandoned, and the CPU takes over. \
+Messages are written by a separate thread, which drops those that it has no time for. \
+SIGINT or SIGTERM ends the program. Under systemd it reports readiness and feeds the watchdog.";
 
 #[derive(Clone, Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
@@ -117,7 +117,7 @@ impl ReplayArgs {
     pub fn check(&self) -> Result<(), Error> {
         let given = [("speed", self.speed.is_some()), ("topic", self.topic.is_some())];
         let alone = given.iter().find(|(_, given)| *given).filter(|_| self.replay.is_none());
-        alone.map_or(Ok(()), |(name, _)| Err(Error::Usage(format!("--{name} is for a --replay"))))
+        alone.map_or(Ok(()), |(name, _)| Err(Error::Usage(format!("--{name} requires --replay"))))
     }
 }
 

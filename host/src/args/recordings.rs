@@ -120,11 +120,11 @@ impl Scheduler {
             let index: usize = number(self.index)?;
             Ok((index, or(self.first, 0)?, or(self.step, 1)?, number(self.count)?))
         };
-        let wrong = |what: String| format!("{} is set, but {what}: give --shard I/N", self.shared);
+        let wrong = |what: String| format!("{} is set, but {what}: use --shard I/N", self.shared);
         let (index, first, step, of): (usize, usize, usize, usize) = read().map_err(wrong)?;
         let ahead = index.checked_sub(first).and_then(|ahead| ahead.checked_div(step));
         let shard = ahead.and_then(|ahead| Shard::new(ahead, of));
-        shard.ok_or_else(|| wrong(format!("it is {index} of {of}, from {first} on by {step}")))
+        shard.ok_or_else(|| wrong(format!("it is {index} of {of}, from {first}, step {step}")))
     }
 }
 

@@ -10,8 +10,8 @@ use super::{FlowChoice, Recording, Recordings, Selection, StreamArgs, Views};
 const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
 
-Returns of objects are segmented and associated from sweep to sweep. Each track is filtered by its \
-centroids (EKF); when it ends, trajectory and shape are estimated jointly from all its returns, \
+Returns of objects are segmented and associated from sweep to sweep. An EKF filters the centroids \
+of each track; when a track ends, trajectory and shape are estimated jointly from all its returns, \
 each at its own time.";
 
 const FILES: &str = "\
@@ -22,11 +22,11 @@ Files of --out DIR:
                      fixed-lag estimate (lag_; NaN without --fixed-lag), which refers to
                      lag_time_s, the end of the sweep; the covariance of the EKF's position
                      (cov_xx cov_xy cov_yy cov_zz, m²) and the variances of its speed and heading
-                     (cov_speed, cov_heading, rad²); the box around what was seen of it:
-                     box_x_m box_y_m box_z_m (its middle in the world), box_heading_rad (what
-                     stands: either end may be the front), length_m, width_m, height_m; p_moves
-                     (mean of its returns; NaN where not known); class (names in the metadata;
-                     255: not known)
+                     (cov_speed, cov_heading, rad²); the box around the part seen:
+                     box_x_m box_y_m box_z_m (its centre in the world), box_heading_rad (if
+                     stationary, either end may be the front), length_m, width_m, height_m;
+                     p_moves (mean of its returns; NaN if unknown); class (names in the
+                     metadata; 255: unknown)
     returns/FRAME.feather  track of every return of a sweep, in its order; -1 without one
     clouds/ID.ply    returns of a track in the object's frame: x y z (m), time (s since the start
                      of the track)

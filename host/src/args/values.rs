@@ -47,7 +47,7 @@ pub(super) fn simd(text: &str) -> Result<Simd, String> {
     let found = Simd::available().find(|simd| simd.name() == text);
     found.ok_or_else(|| {
         let names: Vec<&str> = Simd::available().map(Simd::name).collect();
-        format!("this processor has {}", names.join(", "))
+        format!("this processor supports {}", names.join(", "))
     })
 }
 

@@ -18,41 +18,41 @@ const HEAD: &str = "\
 # Memory layout
 
 What `raywake run` holds from its first sweep to its last, in bytes; nothing is allocated between.
-What `raywake map` and `raywake track` hold is as fixed; it is under `Sparse map` and `Tracks`.
+The memory of `raywake map` and `raywake track` is just as fixed; see `Sparse map` and `Tracks`.
 `raywake budget` prints this file from the declarations the program allocates by, and a test
 compares the two.
 
-A buffer is so many elements of so many bytes. Words are 32-bit, little-endian; an element is
+A buffer is a number of elements of a given size. Words are 32-bit, little-endian; an element is
 aligned to its own size. Each heap is one allocation of device memory; in it every buffer begins at
-a multiple of 16 bytes, more where a device asks for it. No two buffers alias: each has its bytes to
-itself from start to end. Writers and readers are the steps of the schedule in the order they first
-touch the buffer; `fill` sets every word, `copy` moves a whole buffer.
+a multiple of 16 bytes, or of more if the device requires it. No two buffers alias: each has its
+bytes to itself throughout. Writers and readers are the steps of the schedule in the order they
+first touch the buffer; `fill` sets every word, `copy` copies a whole buffer.
 ";
 
 const MAP_HEAD: &str = "
 ## Sparse map
 
-`raywake map` holds these buffers instead. A sweep goes through `map rays` once, then through `map
-count` and `map band` for every band of keys.
+`raywake map` holds these buffers instead. A sweep passes through `map rays` once, then through
+`map count` and `map band` for every band of keys.
 ";
 
 /// Text below the host table of the sparse map.
 const MAP_HOST: &str = "
-The voxels of a sweep, and the file made of them, grow with what is seen and are not counted.
+The voxels of a sweep, and the file made from them, grow with what is seen and are not counted.
 ";
 
 /// Text below either host table.
 const CAPACITY: &str = "
-A sweep of more returns than the capacity is read whole; what the pipeline leaves out of it is
-counted.
+A sweep of more returns than the capacity is read whole; the pipeline counts the returns that it
+leaves out.
 ";
 
 const TRACKS_HEAD: &str = "
 ## Tracks
 
-`raywake track` holds these parts on the host, and two sweeps; with the flow, what `raywake run`
-holds besides. The last one is in place of all others where objects are followed on board, by
-`raywake live --objects` and in the libraries.
+`raywake track` holds these parts on the host, and two sweeps; with the flow, also what `raywake
+run` holds. The last part replaces all others when objects are tracked on board, by `raywake live
+--objects` and in the libraries.
 
 | part | type | bytes |
 |---|---|--:|
@@ -60,14 +60,14 @@ holds besides. The last one is in place of all others where objects are followed
 
 /// Text below the table of the tracks.
 const TRACKS_HOST: &str = "
-The states of tracks that have ended wait for their file, and are not counted.
+The states of ended tracks, held until their file is written, are not counted.
 ";
 
 const RECORDS_HEAD: &str = "
 ## Records
 
-`sweep_in` and `sweep` hold one record `SweepUniform`, of the sweep or, in the sparse map, of the
-band.
+`sweep_in` and `sweep` each hold one `SweepUniform` record, for the sweep or, in the sparse map, for
+the band.
 
 | word | byte | field | type |
 |--:|--:|---|---|

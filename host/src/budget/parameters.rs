@@ -11,16 +11,16 @@ const HEAD: &str = "\
 # Parameters
 
 Printed by `raywake budget --parameters`; a test compares it with this file. A parameter is set by
-`--set NAME=VALUE` or, in a file given with `--config`, by a key of this name, at the top or in a
-table called as its group. Defaults are those of profile `hdl64`, followed by the profiles that
-differ. Figures are described in RESULTS.md.
+`--set NAME=VALUE` or, in a file given with `--config`, by a key of this name, at the top level or
+in a table named after its group. Defaults are those of profile `hdl64`, followed by the profiles
+that differ. Figures are described in RESULTS.md.
 ";
 
 const OBJECTS: &str = "
 ## objects
 
-Those of `raywake track`: `--set objects.NAME=VALUE`, or keys of the table `objects`.
-`objects.GROUP.NAME` tells apart what two groups have.
+Parameters of `raywake track`: `--set objects.NAME=VALUE`, or keys of the table `objects`. A name
+that occurs in two groups is given as `objects.GROUP.NAME`.
 ";
 
 const COLUMNS: &str = "\

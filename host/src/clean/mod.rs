@@ -218,8 +218,8 @@ impl Cleaning<'_> {
     fn text(&self, points: usize) -> String {
         let [none, unknown, still, moving] = self.counts;
         format!(
-            "{} sweeps: {moving} returns move, {still} are static, {unknown} were not looked at \
-             (outside the window), {none} are no surface; {points} voxels of {} m in map.ply\n",
+            "{} sweeps: {moving} returns moving, {still} static, {unknown} not examined (outside \
+             the window), {none} not a surface; {points} voxels of {} m in map.ply\n",
             self.seen.len(),
             self.args.voxel
         )

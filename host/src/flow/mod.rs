@@ -105,7 +105,7 @@ fn cloud(path: &Path, fields: Option<&BinFields>, stamp_s: f64) -> Result<SweepD
 fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error> {
     place::rig(&first.points, args.ground, args.sensor).map_err(|e| match e {
         Unplaced::NoGround => {
-            Error::input(&args.first, "", format!("{e}: give its height with --ground"))
+            Error::input(&args.first, "", format!("{e}: set its height with --ground"))
         }
         Unplaced::Implausible(what) => Error::Usage(what),
     })

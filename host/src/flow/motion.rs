@@ -41,17 +41,17 @@ fn refusal(best: &Registration) -> String {
     let why = match best {
         r if r.iterations == 0 => "too few planar patches are within 3 m of each other".into(),
         r if r.overlap < OVERLAP_MIN => {
-            format!("the clouds overlap by {share:.0} % at most")
+            format!("the clouds overlap by no more than {share:.0} %")
         }
         r if r.unobserved.planar > 0 => format!(
-            "what they show, as one wall, a tunnel or bare ground does, leaves {} of the 3 motions \
-             on the ground undetermined",
+            "the scene, like a single wall, a tunnel or bare ground, leaves {} of the 3 degrees of \
+             freedom on the ground undetermined",
             r.unobserved.planar
         ),
         r => format!("no convergence in {} iterations", r.iterations),
     };
     format!(
-        "cannot be registered to the first cloud: {why}; if the motion is known, give it with \
+        "cannot be registered to the first cloud: {why}; if the motion is known, pass it with \
          --pose"
     )
 }
@@ -67,7 +67,7 @@ fn report(r: &Registration) -> String {
     );
     if r.unobserved.upright > 0 {
         text += &format!(
-            "note: {} of height, roll and pitch not observable; no motion is assumed there\n",
+            "note: {} of height, roll and pitch not observable and assumed unchanged\n",
             r.unobserved.upright
         );
     }

@@ -205,7 +205,7 @@ impl Plan<'_> {
                 Fetched::Value => return Ok(true),
                 Fetched::Nothing if !interrupted() => {}
                 Fetched::Nothing | Fetched::Closed => {
-                    say(self.args.quiet, "no whole sweep arrived\n")?;
+                    say(self.args.quiet, "no complete sweep arrived\n")?;
                     return Ok(false);
                 }
             }
@@ -213,7 +213,7 @@ impl Plan<'_> {
                 told = true;
                 let counts = receiver.state().counts;
                 let what = format!(
-                    "no whole sweep yet: {} packets of a {}, {} other datagrams",
+                    "no complete sweep yet: {} packets from a {}, {} other datagrams",
                     counts.packets,
                     receiver.sensor().name(),
                     counts.foreign

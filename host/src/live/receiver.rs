@@ -115,7 +115,7 @@ impl Receiver {
         let held = self.held();
         (held < HELD).then(|| {
             format!(
-                "the system holds {held} bytes of packets, {HELD} were asked for: sysctl \
+                "the receive buffer holds {held} bytes, {HELD} were requested: sysctl \
                  net.core.rmem_max={HELD} allows them"
             )
         })

@@ -135,6 +135,6 @@ pub fn record(
 }
 
 fn fail(recorded: &mut RecordingOutcome, error: Error) {
-    warn(&format!("{error}: nothing is recorded any more"));
+    warn(&format!("{error}: recording stopped"));
     recorded.failure = Some(error);
 }

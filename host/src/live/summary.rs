@@ -153,10 +153,10 @@ impl LiveSummary {
         let latency = self.latency_ms.map_or("none".into(), |latency| latency.line());
         let digest = self.digest.as_ref().map_or(String::new(), |d| format!("digest {d}\n"));
         format!(
-            "{:.1} s: {done} sweeps, {pairs} pairs; {left_out} left out, {late} later than \
+            "{:.1} s: {done} sweeps, {pairs} pairs; {left_out} dropped, {late} later than \
              {:.0} ms, {incomplete} incomplete, {resets} resets\n\
-             packets: {packets}, missing {missing} (thrown away here: {overflowed}), again \
-             {duplicates}, out of order {reordered}; foreign datagrams {foreign}\n\
+             packets: {packets}, missing {missing} (dropped by this system: {overflowed}), \
+             duplicate {duplicates}, out of order {reordered}; foreign datagrams {foreign}\n\
              latency from the last packet to flow: {latency}\n{digest}",
             self.seconds, self.deadline_ms
         )

@@ -158,7 +158,7 @@ impl LiveRun<'_> {
                 let counts = &mut self.statistics.counts;
                 counts.allocating += 1;
                 if counts.allocating == 1 {
-                    warn(&format!("a defect of this program: {allocation}"));
+                    warn(&format!("internal error: {allocation}"));
                 }
                 Ok(())
             }
@@ -232,7 +232,7 @@ impl LiveRun<'_> {
         let latency = latencies.figures().map_or(String::new(), |l| format!(", {}", l.line()));
         let missing = receiver.state().counts.missing;
         format!(
-            "{:.0} s: {} sweeps{latency}; {} left out, {} late; {missing} packets missing\n",
+            "{:.0} s: {} sweeps{latency}; {} dropped, {} late; {missing} packets missing\n",
             began.elapsed().as_secs_f64(),
             counts.done,
             counts.left_out,

@@ -46,7 +46,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes().iter().chain(&wanted.note))?;
     let most = bytes(Mapper::bytes(&profile) as u64);
-    say(args.quiet, &format!("{}; memory budget: at most {most} of buffers\n", backend.name()))?;
+    say(args.quiet, &format!("{}; memory budget: up to {most} of buffers\n", backend.name()))?;
 
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
     let files = PictureFiles::of(&args.views, args.png.then(|| args.out.clone()));
@@ -105,7 +105,7 @@ impl MapTally {
     /// Figures of the sweep mapped last.
     fn last(&self, voxels: &[Voxel]) -> SweepFigures {
         let ms = self.milliseconds.last().copied().unwrap_or_default();
-        [("voxels", voxels.len() as f64), ("ms a sweep", ms)]
+        [("voxels", voxels.len() as f64), ("ms per sweep", ms)]
     }
 
     fn text(&self) -> String {

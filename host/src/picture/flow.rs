@@ -69,7 +69,7 @@ fn window(half_m: f64, frame: Frame, pose: &Pose) -> [[f32; 2]; 4] {
 
 fn legend(of: &str) -> Vec<LegendEntry> {
     let young =
-        entry(Sign::Arrow(arrow([4.0, 0.0], THIN)), &format!("observed less than {AGE} times"));
+        entry(Sign::Arrow(arrow([4.0, 0.0], THIN)), &format!("observed fewer than {AGE} times"));
     let still = entry(Sign::Cell(colours::STATIC), "static foreground");
     let window = entry(Sign::Line(WINDOW), "window: no estimate outside");
     speeds(of).into_iter().chain([young, still, return_heights(), window]).collect()

@@ -35,7 +35,7 @@ pub(super) fn view(
     let still = entry(Sign::Outline(colours::BORDER), "static");
     let way = Sign::Line(raywake_render::Pen::new(colours::SPEEDS[2], WIDE));
     let legend = speeds("over ground").into_iter();
-    let legend = legend.chain([entry(way, "way so far"), still, return_heights()]).collect();
+    let legend = legend.chain([entry(way, "path so far"), still, return_heights()]).collect();
     (panel, look(REACH_M, CELL_M, legend))
 }
 

@@ -52,13 +52,13 @@ fn parse(path: &Path, content: &str) -> Result<Ground, Error> {
     let find = |key: &str| header.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
     let needed = |key: &str| {
         let value = find(key).filter(|v| v.is_finite());
-        value.ok_or_else(|| whole(format!("`{key}` is missing or not finite: no ESRI ASCII grid")))
+        value.ok_or_else(|| whole(format!("`{key}` missing or not finite: not an ESRI ASCII grid")))
     };
     let [columns, rows] = [needed("ncols")?, needed("nrows")?];
     let corner = [needed("xllcorner")?, needed("yllcorner")?];
     let cell_m = needed("cellsize")?;
     if !(columns >= 1.0 && rows >= 1.0 && cell_m > 0.0) {
-        return Err(whole("a grid has cells of a size above 0".into()));
+        return Err(whole("ncols and nrows must be at least 1 and cellsize above 0".into()));
     }
     let (columns, rows) = (columns as usize, rows as usize);
     let nothing = find("nodata_value");
@@ -66,14 +66,14 @@ fn parse(path: &Path, content: &str) -> Result<Ground, Error> {
     for (number, line) in lines {
         let row = text::numbers(path, number, line)?;
         if row.len() != columns {
-            let what = format!("{columns} heights expected, {} found", row.len());
+            let what = format!("expected {columns} heights, found {}", row.len());
             return Err(Error::input(path, format!("line {number}"), what));
         }
         let height = |z: f64| if Some(z) == nothing { f32::NAN } else { z as f32 };
         heights.push(row.into_iter().map(height).collect::<Vec<_>>());
     }
     if heights.len() != rows {
-        return Err(whole(format!("{rows} rows of heights expected, {} found", heights.len())));
+        return Err(whole(format!("expected {rows} rows of heights, found {}", heights.len())));
     }
     heights.reverse();
     Ok(Ground { corner, cell_m, columns, heights: heights.concat() })
@@ -125,7 +125,7 @@ NODATA_value -9999
         let wrong = [
             ("cellsize 2", "", "`cellsize`"),
             ("cellsize 2", "cellsize -2", "above 0"),
-            ("ncols 3", "ncols 4", "line 7: 4 heights expected, 3 found"),
+            ("ncols 3", "ncols 4", "line 7: expected 4 heights, found 3"),
             ("nrows 2", "nrows 3", "3 rows"),
             ("nrows 2", "nrows two", "line 2: `two` is not a number"),
             ("1 nan 3", "1 x 3", "line 8: `x` is not a number"),

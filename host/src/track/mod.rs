@@ -114,7 +114,7 @@ fn budget(fixed_lag: bool) -> String {
     if fixed_lag {
         let (iterations, returns) = (FixedLag::ITERATIONS_MAX, FixedLag::RETURNS_MAX);
         text += &format!(
-            "fixed lag: {iterations} iterations over {returns} returns at most a track and sweep\n"
+            "fixed lag: at most {iterations} iterations, {returns} returns per track and sweep\n"
         );
     }
     text

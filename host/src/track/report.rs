@@ -219,7 +219,7 @@ impl TrackSummary {
         let brief = self.tally.ended.saturating_sub(listed);
         writeln!(
             out,
-            "\n{} sweeps, {} tracks ({brief} omitted as short, or as no object: see --all){end}",
+            "\n{} sweeps, {} tracks ({brief} omitted as too short or not objects: see --all){end}",
             self.sweeps,
             self.tracks.len()
         )?;

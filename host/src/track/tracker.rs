@@ -158,8 +158,8 @@ impl Tracker {
         [
             ("front end", "FrontEnd", size_of::<FrontEnd>()),
             ("tracks", "Track", TRACKS_MAX * size_of::<Track>()),
-            ("estimates at the same time", "Solver", SOLVERS * solver),
-            ("estimates of every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * lag),
+            ("concurrent estimates", "Solver", SOLVERS * solver),
+            ("estimates at every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * lag),
         ]
     }
 

@@ -82,7 +82,7 @@ impl Files {
         let (objects, ways): (Vec<TrackedObject>, Vec<Vec<[f64; 3]>>) =
             tracker.objects().map(|(object, track)| (object, way(track))).unzip();
         let moving = objects.iter().filter(|o| o.velocity.is_some()).count();
-        let figures = [("moving objects", moving as f64), ("ms a sweep", ms)];
+        let figures = [("moving objects", moving as f64), ("ms per sweep", ms)];
         self.pictures.write(
             sweep,
             &Subject::Objects { objects: &objects, ways: &ways },

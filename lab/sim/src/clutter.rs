@@ -33,7 +33,7 @@ pub struct UnknownClutter(String);
 impl fmt::Display for UnknownClutter {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let names: Vec<_> = Clutter::ALL.into_iter().map(Clutter::name).collect();
-        write!(f, "no clutter is called `{}`; there are {}", self.0, names.join(", "))
+        write!(f, "no clutter is called `{}`; the available ones are {}", self.0, names.join(", "))
     }
 }
 

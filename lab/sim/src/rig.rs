@@ -60,7 +60,12 @@ pub struct UnknownRig(String);
 
 impl fmt::Display for UnknownRig {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "no sensor rig is called `{}`; there are {}", self.0, SensorRig::NAMES.join(", "))
+        write!(
+            f,
+            "no sensor rig is called `{}`; the available ones are {}",
+            self.0,
+            SensorRig::NAMES.join(", ")
+        )
     }
 }
 

@@ -32,7 +32,7 @@ pub struct UnknownScenery(String);
 impl fmt::Display for UnknownScenery {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let names: Vec<_> = Scenery::all().map(Scenery::name).collect();
-        write!(f, "no scenery is called `{}`; there are {}", self.0, names.join(", "))
+        write!(f, "no scenery is called `{}`; the available ones are {}", self.0, names.join(", "))
     }
 }
 

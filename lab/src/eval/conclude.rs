@@ -133,31 +133,31 @@ fn returns(report: &mut Report, drives: &[Facts]) {
 
 const RAW: &str = "The error is the distance between the displacement found for a solid column \
     from one sweep to the next and that of the labelled object it belongs to. Columns that the \
-    filter takes for background, and columns without a match, put out no motion over ground and \
-    are scored as such.";
+    filter takes for background, and columns without a match, output no motion over ground and are \
+    scored as such.";
 
 const TRACKLETS: &str = "The error is the distance between the velocity over ground of a column's \
     tracklet and that of its object at the column's centre.";
 
-const UNCERTAINTY: &str = "Every displacement and every velocity has a covariance. It means \
-    something where so many of the true values lie in its ellipses as it claims. Truth is the \
-    simulator's, or the smoothed labels, whose own errors count as ours; what is parked, and what \
-    no label holds, is at rest.";
+const UNCERTAINTY: &str = "Every displacement and every velocity has a covariance. It is \
+    meaningful if its ellipses contain the share of true values that it claims. Truth is the \
+    simulator's, or the smoothed labels, whose own errors count as ours; whatever is parked or \
+    unlabelled is at rest.";
 
 /// Text explaining the scores of returns.
 fn about_returns() -> String {
     format!(
-        "Every return has the velocity of its column over the time between the sweeps. \
-    Truth is the simulator's, or the motion of the labelled box a return lies in; what is in none \
-    stands, but for what lies so close outside one ({DOUBT_M} m) that it may belong to it, which \
-    is not scored. Without a map, returns without a label up to {GROUND_M} m above the plane the \
-    vehicle stands on count as ground, which is left out. For the graders' own truth and ground \
-    of an Argoverse 2 log see `raywake-lab grade`."
+        "Every return has the velocity of its column over the time between the sweeps. Truth is \
+    the simulator's, or the motion of the labelled box that contains the return; returns in no box \
+    are static, except those so close to one ({DOUBT_M} m) that they may belong to it, which are \
+    not scored. Without a map, returns without a label up to {GROUND_M} m above the plane the \
+    vehicle stands on count as ground, which is left out. For the graders' own truth and ground of \
+    an Argoverse 2 log see `raywake-lab grade`."
     )
 }
 
 const TIME: &str = "From the sweep in memory to flow in memory, while another thread makes rows, \
-    and other drives run where `--jobs` says so; `raywake run` has the machine to itself.";
+    and other drives run if `--jobs` is above 1; `raywake run` has the machine to itself.";
 
 fn subtitle(drives: &[Facts]) -> String {
     let pairs: u64 = drives.iter().map(|d| d.pairs).sum();
@@ -183,9 +183,9 @@ fn headlines(report: &mut Report, evidence: &Evidence, drives: &[Facts]) {
     let counts = evidence.verdicts.all();
     report.headline(
         &number(100.0 * counts.precision(), "%", 1),
-        "of the columns put out as moving do",
+        "of the columns reported as moving do move",
         &format!(
-            "and {} of those that move are put out so",
+            "and {} of those that move are reported so",
             number(100.0 * counts.recall(), "%", 1)
         ),
     );
@@ -196,7 +196,7 @@ fn headlines(report: &mut Report, evidence: &Evidence, drives: &[Facts]) {
     );
     report.headline(
         &number(settled.quantile(0.5), "m/s", 2),
-        "median error of tracklets of age 10 and more, moving",
+        "median error of tracklets of age 10 or more, moving",
         "all labelled in the dissertation: 0.50 m/s",
     );
     let totals: Vec<f64> = drives.iter().flat_map(|d| &d.totals).copied().collect();
@@ -244,19 +244,18 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
     let tracks: usize = drives.iter().map(|d| d.tracks).sum();
     let section = report.section("What is counted");
     section.text(&format!(
-        "Where the truth of every return is known, in simulated drives, a column belongs to what \
-         most of its returns above the ground hit. Where it has none, and in the other drives, it \
-         belongs to the first labelled box, in the order of the labels, that its centre lies in, \
-         seen from above, with a margin of {} m: the road below a car is in the car's column. \
-         Where exact truth tells such columns of road apart, {} of them, they count nowhere but \
-         in one row of what moves. \
-         {tracks} labelled objects have {boxes} boxes.\n\n\
+        "If the truth of every return is known, as in simulated drives, a column belongs to the \
+         object hit by most of its returns above the ground. If it has none, and in other drives, \
+         it belongs to the first labelled box, in the order of the labels, that contains its \
+         centre, seen from above, with a margin of {} m: the road below a car is in the car's \
+         column. Where exact truth distinguishes such columns of road, {} of them, they count only \
+         in one row of moving columns. {tracks} labelled objects have {boxes} boxes.\n\n\
          Columns count where labels are complete, at both ends of their true motion: in drives \
          labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the \
-         others, all around. {} columns do not.\n\n\
-         An object moves from {} m/s over ground on.\n\n\
+         others, all round. {} columns do not.\n\n\
+         An object is moving from {} m/s over ground.\n\n\
          Columns without a valid match and columns that the filter rejects are scored with what \
-         the program puts out for them: no motion over ground.",
+         the program outputs for them: no motion over ground.",
         settings.margin_m,
         tally.below,
         tally.out_of_view,

@@ -150,8 +150,7 @@ pub fn evaluate(
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     if !source.is_located() {
-        let what =
-            "labels are placed by poses: find them with `raywake odometry`, then --poses FILE";
+        let what = "labels are placed by poses: compute them with `raywake odometry`, then pass --poses FILE";
         return Err(Error::input(path, "", what).into());
     }
     let files = Files::of(out, name);
@@ -210,7 +209,7 @@ fn labels(path: &Path, source: &dyn Source, semantic: bool) -> Result<Labels, Er
 
 fn view(view: View) -> &'static str {
     match view {
-        View::All => "all around",
+        View::All => "all round",
         View::Camera => "the front camera's view",
         View::Nowhere => "",
     }
@@ -300,7 +299,7 @@ fn run(
         facts.notes.extend(resets.map(|r| format!("frame {}: {}", r.frame, r.text)));
     }
     let dropped = summary.dropped.to_string();
-    facts.notes.push(format!("left out by the pipeline: {dropped}"));
+    facts.notes.push(format!("dropped by the pipeline: {dropped}"));
     Ok(())
 }
 

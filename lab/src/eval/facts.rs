@@ -95,7 +95,7 @@ impl Facts {
         let facts: Facts = serde_json::from_str(&text)
             .map_err(|e| Error::input(path, format!("line {}", e.line()), e.to_string()))?;
         if !facts.scores.iter().all(PointScores::are_whole) {
-            return Err(Error::input(path, "key `scores`", "is of another version"));
+            return Err(Error::input(path, "key `scores`", "is from another version"));
         }
         Ok(facts)
     }

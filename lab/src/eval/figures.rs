@@ -90,13 +90,13 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
         Chart::small_multiples(
             "figure-3-7",
             "As figure 3.7 of the dissertation: errors of the raw flow by class, moving and parked \
-             apart; the dashed line is the size of a cell.",
+             separately; the dashed line is the size of a cell.",
             by_class.collect(),
         ),
         Chart::small_multiples(
             "figure-3-8",
             "As figure 3.8 of the dissertation: errors of the raw flow of all labelled columns, \
-            then what moves and what is parked.",
+            then of moving and of parked ones.",
             by_motion.into(),
         ),
     ]
@@ -146,15 +146,15 @@ pub fn tracklets(tally: &Tally) -> Chart {
             .map(|(n, a)| series(format!("age {a}"), &tally.at_age(n, group, motion)))
             .collect();
         let settled = tally.settled(group, motion, Weight::Column);
-        lines.series.push(series(format!("{SETTLED} and more"), &settled));
+        lines.series.push(series(format!("{SETTLED} or more"), &settled));
         (title(group, motion), Plot::Lines(lines))
     };
     let moving = groups(tally).into_iter().map(|g| (g, MotionGroup::Moving));
     let parts = moving.chain([(ClassGroup::Labelled, MotionGroup::Parked)]);
     let parts = parts.filter(|(g, m)| *g != ClassGroup::Class(0) && tally.coverage(*g, *m)[0] > 0);
     let caption = "As figure 3.9 of the dissertation: errors of the velocity of tracklets after \
-        exactly so many observations, or so many and more. Age 0 has flow whose tracklet the gate \
-        ended too.";
+        exactly this many observations, or at least this many. Age 0 includes flow whose tracklet \
+        the gate ended.";
     Chart::small_multiples("figure-3-9", caption, parts.map(part).collect())
 }
 
@@ -169,7 +169,7 @@ pub fn settled(tally: &Tally) -> Chart {
         lines.series.push(cdf(motion.label(), &errors, CDF_MPS, Style::Line));
     }
     lines.guides.push(Guide::Y(0.5, "median".into()));
-    let caption = "Errors of the velocity of tracklets of age 10 and more, all labelled columns.";
+    let caption = "Errors of the velocity of tracklets of age 10 or more, all labelled columns.";
     Chart::new("figure-settled", caption, Plot::Lines(lines))
 }
 
@@ -180,7 +180,7 @@ pub fn times(drives: &[Facts]) -> Chart {
         Spread::of(ms).map(|s| Bar { value: s.median, spread: Some([s.median, s.p99]) })
     };
     let series = BarSeries {
-        name: "median, with a line to 99 %".into(),
+        name: "median, with a line to the 99 % quantile".into(),
         reference: false,
         bars: stages.iter().map(|s| bar(&s.1)).collect(),
     };
@@ -202,14 +202,14 @@ pub fn time_by_points(drives: &[Facts]) -> Chart {
             marks: Vec::new(),
         }
     };
-    let mut lines = Lines::new(Axis::new("returns of the sweep"), Axis::new("time, ms"));
+    let mut lines = Lines::new(Axis::new("returns in the sweep"), Axis::new("time, ms"));
     lines.series.push(series(GRID.name, &|d| GRID.of(d)));
-    lines.series.push(series("all of a pair of sweeps", &|d| d.totals.clone()));
+    lines.series.push(series("whole pair of sweeps", &|d| d.totals.clone()));
     let slowest = drives.iter().flat_map(|d| &d.totals).fold(0.0, |a, b| f64::max(a, *b));
     if slowest > 0.5 * BUDGET_MS {
         lines.guides.push(Guide::Y(BUDGET_MS, "time between sweeps".into()));
     }
     let caption = "As section B.4 of the dissertation: time of the occupancy grid against the \
-        number of returns; all of a pair of sweeps beside it.";
+        number of returns, beside the time of a whole pair of sweeps.";
     Chart::new("figure-b-4", caption, Plot::Lines(lines))
 }

@@ -93,11 +93,11 @@ pub fn raw_flow(tallies: Tallies) -> Table {
         rows.extend(published_row(group, columns.len()));
     }
     let caption = "As table 3.1 of the dissertation: error of the raw flow of a pair of sweeps.";
-    let note = "Voxels: every column counts as often as it has occupied voxels, as the \
-        dissertation's programs count. Relative: median error of what moves as a share of its \
-        displacement; people do not walk 30 cm from one sweep to the next, so that being within \
-        them says nothing. Pair by pair: everything known from earlier sweeps is dropped before \
-        each pair (`--pairs`).";
+    let note = "Voxels: every column counts as often as it has occupied voxels, as in the \
+        dissertation's programs. Relative: median error of moving columns as a share of their \
+        displacement; people do not walk 30 cm from one sweep to the next, so the share within 30 \
+        cm says nothing about them. Pair by pair: all history is discarded before each pair \
+        (`--pairs`).";
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
     Table::new("table-3-1", caption, &names, rows).note(note)
 }
@@ -141,7 +141,7 @@ pub fn references(tallies: Tallies, truth: Truth) -> Table {
         }
     }
     let (id, what) = match truth {
-        Truth::Raw => ("references-raw", "labels as they are"),
+        Truth::Raw => ("references-raw", "labels as given"),
         Truth::Smooth => ("references-smooth", "smoothed labels, parked objects at rest"),
     };
     let caption = format!(

@@ -255,7 +255,7 @@ fn all(
         }
     });
     if interrupted() {
-        return Err(Error::Usage("interrupted; the drives that were finished stay".into()));
+        return Err(Error::Usage("interrupted; finished drives are kept".into()));
     }
     let (mut good, mut bad) = (Vec::new(), Vec::new());
     for (name, result) in done.into_inner().expect("no thread panicked with it") {
@@ -269,7 +269,7 @@ fn all(
 
 fn say(result: &Result<(Facts, bool), RunError>, name: &str, n: usize, of: usize) {
     match result {
-        Ok((_, true)) => eprintln!("[{n}/{of}] {name}: there already"),
+        Ok((_, true)) => eprintln!("[{n}/{of}] {name}: already done"),
         Ok((f, false)) => {
             let rate = f.sweeps as f64 / f.seconds;
             eprintln!(

@@ -39,7 +39,7 @@ struct Candidate {
 
 /// The sweeps drawn: by the error of their raw flow, then those with most moving tracklets while
 /// the vehicle is stationary (figure 3.10) and while it drives (figures 3.11 and 3.12).
-const PICTURES: [&str; 4] = ["worst", "best", "busiest standing", "busiest driving"];
+const PICTURES: [&str; 4] = ["worst", "best", "busiest stationary", "busiest driving"];
 /// A vehicle slower than this is stationary, m/s: twice the speed that poses with an error of 1 cm
 /// on every sweep give a stationary one.
 const STANDING_MPS: f64 = 0.3;
@@ -84,21 +84,22 @@ impl Panels {
             let file = format!("{drive}-{}.png", what.replace(' ', "-"));
             let frame = c.seen.first.frame;
             let (panels, shows) = match *what {
-                "busiest standing" => (
+                "busiest stationary" => (
                     [c.raw(), c.tracklets(true)],
-                    "Temporal scene flow while the vehicle stands, as in figure 3.10.".to_string(),
+                    "Temporal scene flow while the vehicle is stationary, as in figure 3.10."
+                        .to_string(),
                 ),
                 "busiest driving" => (
                     [c.tracklets(true), c.tracklets(false)],
-                    "Temporal scene flow over ground, as in figure 3.11, and as the moving vehicle \
-                     sees it, as in figure 3.12."
+                    "Temporal scene flow over ground, as in figure 3.11, and as seen from the \
+                     moving vehicle, as in figure 3.12."
                         .to_string(),
                 ),
                 _ => (
                     [c.raw(), c.tracklets(true)],
                     format!(
-                        "Mean error of the raw flow of labelled columns: {:.0} cm, errors counted \
-                         up to {CLIP_M} m.",
+                        "Mean error of the raw flow of labelled columns: {:.0} cm, errors clipped \
+                         at {CLIP_M} m.",
                         100.0 * c.mean_m
                     ),
                 ),
@@ -108,7 +109,7 @@ impl Panels {
                 cell_m,
                 error: "error, m".into(),
                 worst: WORST_M,
-                arrows: format!("way in {ARROW_S} s"),
+                arrows: format!("path in {ARROW_S} s"),
             };
             let png = birds_eye(&panels, &look)?;
             atomic::write(&folder.join(&file), |out| out.write_all(&png))?;

@@ -30,8 +30,8 @@ pub fn argoverse(scores: &[PointScores; 3]) -> [Table; 2] {
     let names = Class::ALL.iter().skip(1).map(|c| c.name());
     let columns: Vec<&str> = ["Estimate", "Mean"].into_iter().chain(names).collect();
     let rows = scores.iter().enumerate().map(|(n, s)| estimate_row(n, normalised(s))).collect();
-    let caption = "Bucket-normalised error of moving returns within 35 m, as Argoverse 2 ranks: \
-        1 is what an estimate of no motion scores.";
+    let caption = "Bucket-normalised error of moving returns within 35 m, the ranking of Argoverse \
+        2: an estimate of no motion scores 1.";
     let bucketed = Table::new("bucketed", caption, &columns, rows);
     let three = |s: &PointScores| {
         let e = s.three_way.errors(Range::Near);
@@ -57,7 +57,7 @@ pub fn argoverse(scores: &[PointScores; 3]) -> [Table; 2] {
 /// EPE3D, accuracies and outliers of single returns (KITTI).
 pub fn accuracy(scores: &[PointScores; 3]) -> Table {
     let mut rows = Vec::new();
-    for (name, motion) in [("moving", PointMotion::Moving), ("standing", PointMotion::Standing)] {
+    for (name, motion) in [("moving", PointMotion::Moving), ("static", PointMotion::Standing)] {
         for (n, s) in scores.iter().enumerate() {
             let foreground =
                 |c: Category| c.class().is_some_and(|class| class != Class::Background);
@@ -75,7 +75,7 @@ pub fn accuracy(scores: &[PointScores; 3]) -> Table {
     }
     let columns =
         ["Estimate", "Objects", "Returns", "EPE3D, m", "AccS, %", "AccR, %", "Outliers, %"];
-    let caption = "Metrics of scene flow on KITTI, for the returns of labelled objects, motion of \
-        the vehicle removed. Of standing ones every error counts as an outlier.";
+    let caption = "KITTI scene flow metrics for the returns of labelled objects, with the \
+        vehicle's motion removed. For static ones every error counts as an outlier.";
     Table::new("accuracy", caption, &columns, rows)
 }

@@ -48,7 +48,7 @@ pub fn read(path: &Path, mut each: impl FnMut(&[Row])) -> Result<(), Error> {
         let rows = rows(&batch)
             .map_err(|column| Error::input(path, format!("column `{column}`"), "is missing"))?;
         if let Some(row) = rows.iter().find(|r| !r.is_sound()) {
-            let what = format!("class {}, motion {}: no such", row.class, row.motion);
+            let what = format!("class {}, motion {}: unknown", row.class, row.motion);
             return Err(Error::input(path, format!("sweep {}", row.sweep), what));
         }
         each(&rows);

@@ -22,7 +22,7 @@ const TRACKLETS: [&str; 10] = [
     "Coverage, %",
     "Raw labels: median, m/s",
     "Raw labels: mean, m/s",
-    "Raw labels' own floor: median, m/s",
+    "Raw labels' floor: median, m/s",
     "Floor: mean, m/s",
 ];
 
@@ -53,9 +53,9 @@ pub fn tracklets(tally: &Tally) -> Table {
         rows.extend(published_tracklets(group));
     }
     let caption = "As table 3.2 of the dissertation: error of the velocity of tracklets of age 10 \
-        and more. Truth: smoothed labels, parked objects at rest, and beside them the labels as \
-        they are, whose distance from the smoothed ones is their floor; a simulator's labels are \
-        exact. Coverage: columns with such a tracklet, of all.";
+        or more. Truth: smoothed labels, parked objects at rest; and separately the labels as \
+        given, whose distance from the smoothed ones is their floor; a simulator's labels are \
+        exact. Coverage: share of all columns that have such a tracklet.";
     Table::new("table-3-2", caption, &TRACKLETS, rows)
 }
 
@@ -97,7 +97,7 @@ pub fn filter(curve: Option<&Curve>) -> Table {
         TableRow::reference(dissertation.into_iter().chain([Cell::Empty])),
     ];
     let columns = ["Operating point", "Recall, %", "Background accuracy, %", "Precision, %"];
-    let caption = "Background filter over solid columns in view. Foreground is what lies in a \
+    let caption = "Background filter over solid columns in view. Foreground is whatever lies in a \
         labelled box; background accuracy is the share of the other columns that are rejected.";
     Table::new("filter", caption, &columns, rows)
 }
@@ -196,9 +196,8 @@ pub fn times(drives: &[Facts]) -> Table {
     let within = totals.iter().filter(|t| **t < BUDGET_MS).count();
     let share = 100.0 * within as f64 / totals.len().max(1) as f64;
     let caption = format!(
-        "As table 3.3 of the dissertation: time per pair of sweeps, {} pairs; {share:.1} % of \
-        them within 100 ms (the dissertation: over 99 %). Its steps, then the stages that ours are \
-        made of.",
+        "As table 3.3 of the dissertation: time per pair of sweeps, {} pairs; {share:.1} % of them \
+        within 100 ms (the dissertation: over 99 %). Its steps, then our stages that make them up.",
         totals.len(),
     );
     let columns = [

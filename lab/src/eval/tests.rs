@@ -177,7 +177,7 @@ fn boxes_where_no_truth_tells() {
     assert_eq!(labelled("0"), 0);
     let all = (returns(0) + returns(1)) as f64;
     let count = |column: &str| figure(&out, "semantic-kitti", &["building"], column);
-    assert_eq!((count("Returns"), count("Put out as moving") > 0.0), (all, true));
+    assert_eq!((count("Returns"), count("Reported as moving") > 0.0), (all, true));
 }
 
 #[test]

@@ -37,17 +37,16 @@ pub fn conclude(outcome: &Outcome, facts: &[(&str, String)], out: &Path) -> Resu
     let [filled, valid] = &outcome.tallies;
     let all = filled.of(|_, _| true);
     let change = 100.0 * (all[4].mean_cm() / all[3].mean_cm() - 1.0);
-    report.headline(&format!("{change:.0} %"), "mean error", "features against constancy");
+    report.headline(&format!("{change:.0} %"), "mean error", "features relative to constancy");
     report.section("Table 4.2").table(table(
         "table-4-2",
-        "Table 4.2: raw flow of labelled cells, what a method leaves without \
-            flow taken to stand",
+        "Table 4.2: raw flow of labelled cells, those a method leaves without flow taken as static",
         filled,
     ));
     report.section("Table 4.2 where a method has flow").table(table(
         "table-4-2-valid",
-        "The same where a method has flow, as the author's program counts: \
-            each method on cells of its own",
+        "The same where a method has flow, as the author's program counts: each method on its own \
+            cells",
         valid,
     ));
     let curves = curves(&outcome.compared);
@@ -56,9 +55,9 @@ pub fn conclude(outcome: &Outcome, facts: &[(&str, String)], out: &Path) -> Resu
         if let Some(distances) = outcome.distances.get(kind) {
             let kind = format!("{kind:?}").to_lowercase();
             let caption = format!(
-                "Three cells that move ({kind}), in the pair with most of them: distance of their \
-                 features from those around a sweep later. Dots are cells with a return, a white \
-                 frame is where the cell went; forward is up, 9.3 m across."
+                "Three moving cells ({kind}), in the pair with most of them: distance of their \
+                 features from those around them one sweep later. Dots are cells with a return, a \
+                 white frame is where the cell went; forward is up, 9.3 m across."
             );
             let title =
                 format!("Figure 4.{}: distances, {kind}", id.trim_start_matches("figure-4-"));
@@ -87,8 +86,8 @@ fn table(id: &str, caption: &str, tally: &Tally) -> Table {
         .map(|kind| row(&format!("{kind:?}").to_lowercase(), tally.of(|k, _| k == kind)))
         .collect();
     rows.push(row("all", tally.of(|_, _| true)));
-    rows.push(row("all that move", tally.of(|_, moves| moves)));
-    rows.push(row("all that are parked", tally.of(|_, moves| !moves)));
+    rows.push(row("all moving", tally.of(|_, moves| moves)));
+    rows.push(row("all parked", tally.of(|_, moves| !moves)));
     for (name, [constancy, right, features, features_right]) in PUBLISHED {
         let number = |v| Cell::Number(v, 1);
         let empty = || Cell::Empty;
@@ -152,7 +151,7 @@ fn precision(curves: &[Option<Curve>]) -> Table {
         ])
     });
     let columns = ["metric", "average precision", "AUC", "precision at recall 0.9"];
-    let caption = "Whether two cells match, a pair each of labelled cells, half of them matching";
+    let caption = "Whether two labelled cells match, over pairs of which half match";
     Table::new("match", caption, &columns, rows.collect())
 }
 
@@ -163,7 +162,11 @@ fn figure_4_8(curves: &[Option<Curve>]) -> Chart {
         let points = curve.iter().flat_map(Curve::points).map(|p| [p.recall, p.precision]);
         plot.series.push(Series::line(name, points.collect()));
     }
-    Chart::new("figure-4-8", "Figure 4.8: matching cells told from others", Plot::Lines(plot))
+    Chart::new(
+        "figure-4-8",
+        "Figure 4.8: matching cells distinguished from others",
+        Plot::Lines(plot),
+    )
 }
 
 fn figure_4_5() -> Chart {
@@ -181,11 +184,16 @@ fn times(outcome: &Outcome) -> Table {
     let seconds = outcome.seconds;
     let mean = |s: f64| Cell::Number(1000.0 * s / outcome.pairs as f64, 0);
     let rows = [
-        ("network, a sweep, two threads", seconds.encoder),
+        ("network, per sweep, two threads", seconds.encoder),
         ("distances and energy minimisation", seconds.features),
         ("occupancy constancy and energy minimisation", seconds.constancy),
     ];
     let rows = rows.map(|(name, s)| TableRow::new([Cell::from(name), mean(s)]));
-    Table::new("time-flsf", "Mean time of a pair, rays apart", &["part", "ms"], rows.to_vec())
-        .note("The dissertation: 188 ms on a GTX 1080 with features, below 100 ms without.")
+    Table::new(
+        "time-flsf",
+        "Mean time of a pair, without ray tracing",
+        &["part", "ms"],
+        rows.to_vec(),
+    )
+    .note("The dissertation: 188 ms on a GTX 1080 with features, below 100 ms without.")
 }

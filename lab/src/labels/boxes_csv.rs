@@ -29,7 +29,7 @@ pub(super) fn read(path: &Path) -> Result<Labels, Error> {
     for (line, content) in lines {
         let fields: Vec<&str> = content.split(',').map(str::trim).collect();
         let row = row(&fields).map_err(|what| {
-            Error::input(path, format!("line {line}"), format!("no box: {what}"))
+            Error::input(path, format!("line {line}"), format!("not a box: {what}"))
         })?;
         gather.add(&row);
     }
@@ -45,13 +45,13 @@ fn row<'a>(fields: &[&'a str]) -> Result<LabelRow<'a>, String> {
         return Err(format!("{} fields, {} expected", fields.len(), COLUMNS.len()));
     }
     let number = |n: usize| {
-        let bad = |_| format!("`{}` is no {}", fields[n], COLUMNS[n]);
+        let bad = |_| format!("`{}` is not a valid {}", fields[n], COLUMNS[n]);
         fields[n].parse::<f64>().map_err(bad)
     };
     Ok(LabelRow {
         id: fields[1],
         class: fields[2],
-        frame: fields[0].parse().map_err(|_| format!("`{}` is no frame", fields[0]))?,
+        frame: fields[0].parse().map_err(|_| format!("`{}` is not a frame number", fields[0]))?,
         size: [number(6)?, number(7)?, number(8)?],
         centre: [number(3)?, number(4)?, number(5)?],
         rotation: heading(number(9)?),
@@ -85,10 +85,11 @@ mod tests {
         assert_eq!(track.boxes[&7].translation.to_array(), [10.0, 2.0, -0.8]);
         let refused = |text: &str| read_text(text).unwrap_err().to_string();
         assert!(
-            refused("7,3,Van,10,2,-0.8,4,2,1.9").ends_with("line 2: no box: 9 fields, 10 expected")
+            refused("7,3,Van,10,2,-0.8,4,2,1.9")
+                .ends_with("line 2: not a box: 9 fields, 10 expected")
         );
-        assert!(refused("7,3,Van,x,2,-0.8,4,2,1.9,0").contains("`x` is no x"));
-        assert!(refused("-7,3,Van,1,2,-0.8,4,2,1.9,0").contains("`-7` is no frame"));
+        assert!(refused("7,3,Van,x,2,-0.8,4,2,1.9,0").contains("`x` is not a valid x"));
+        assert!(refused("-7,3,Van,1,2,-0.8,4,2,1.9,0").contains("`-7` is not a frame number"));
         let odd = read_text("7,3,Van,NaN,2,-0.8,4,2,1.9,0\n7,4,Van,1,2,-0.8,4,0,1.9,0").unwrap();
         assert_eq!((odd.tracks.len(), odd.notes.len()), (0, 2));
         let headless = t.write("boxes.csv", "7,3,Van,10,2,-0.8,4,2,1.9,0\n");

@@ -142,7 +142,7 @@ mod tests {
         let negative = annotations(&logged(&t, 7.0, [-1, 200])).unwrap();
         assert_eq!(negative.notes, ["1 boxes left out: a negative frame"]);
         let twice = annotations(&logged(&t, 7.0, [200, 200])).unwrap();
-        assert_eq!(twice.notes, ["1 boxes left out: the track has another in the same frame"]);
+        assert_eq!(twice.notes, ["1 boxes left out: the track already has one in that frame"]);
     }
 
     #[test]

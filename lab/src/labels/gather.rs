@@ -67,11 +67,11 @@ impl Gather {
             Entry::Occupied(_) => true,
         };
         if twice {
-            self.leave_out("boxes left out: the track has another in the same frame");
+            self.leave_out("boxes left out: the track already has one in that frame");
         } else if renamed {
-            self.leave_out("boxes whose class is not that of their track's first box");
+            self.leave_out("boxes whose class differs from that of their track's first box");
         } else if resized {
-            self.leave_out("boxes whose size is not that of their track's first box");
+            self.leave_out("boxes whose size differs from that of their track's first box");
         }
     }
 
@@ -92,8 +92,7 @@ impl Gather {
         let mut notes: Vec<String> =
             self.left_out.iter().map(|(why, count)| format!("{count} {why}")).collect();
         for (class, count) in &self.unknown {
-            notes
-                .push(format!("class `{class}` is unknown: {count} tracks of it counted as other"));
+            notes.push(format!("unknown class `{class}`: {count} tracks counted as other"));
         }
         Labels { tracks: self.tracks, view, exact: false, notes }
     }
@@ -106,7 +105,7 @@ fn usable(row: &LabelRow) -> Result<Pose, &'static str> {
         return Err("boxes left out: a NaN or infinite number");
     }
     if row.size.iter().any(|&s| s <= 0.0) {
-        return Err("boxes left out: no length, width or height");
+        return Err("boxes left out: length, width or height not positive");
     }
     if (row.rotation.length() - 1.0).abs() > 1e-3 {
         return Err("boxes left out: the quaternion is not of length 1");
@@ -152,13 +151,13 @@ mod tests {
         assert_eq!((labels.tracks.len(), labels.tracks[0].boxes.len()), (1, 3));
         assert_eq!(labels.tracks[0].kind, Kind::Other);
         let expected = [
-            "1 boxes left out: no length, width or height",
+            "1 boxes left out: length, width or height not positive",
             "2 boxes left out: a NaN or infinite number",
             "1 boxes left out: the quaternion is not of length 1",
-            "1 boxes left out: the track has another in the same frame",
-            "1 boxes whose class is not that of their track's first box",
-            "1 boxes whose size is not that of their track's first box",
-            "class `Zeppelin` is unknown: 1 tracks of it counted as other",
+            "1 boxes left out: the track already has one in that frame",
+            "1 boxes whose class differs from that of their track's first box",
+            "1 boxes whose size differs from that of their track's first box",
+            "unknown class `Zeppelin`: 1 tracks counted as other",
         ];
         for e in expected {
             assert!(labels.notes.iter().any(|n| n == e), "{e}: {:?}", labels.notes);

@@ -72,7 +72,7 @@ fn read_calib(path: &Path) -> Result<Pose, Error> {
     let rectified = [a, b, c, 0.0, d, e, f, 0.0, g, h, i, 0.0];
     let (line, rows) = keyed::<12>(path, &text, ["Tr_velo_cam", "Tr_velo_to_cam"])?;
     let pose = |rows: &[f64; 12]| {
-        let what = |_| "the rotation of R_rect or Tr_velo_cam is none";
+        let what = |_| "R_rect or Tr_velo_cam is not a rotation";
         Pose::from_rows(rows).map_err(|e| Error::input(path, format!("line {line}"), what(e)))
     };
     Ok((pose(&rectified)? * pose(&rows)?).inverse())
@@ -138,13 +138,13 @@ mod tests {
         assert!(refused(&line.replace("0 7", "-1 7")).contains("field 1: `-1` is not a number"));
         let notes = |text: &str| labels(&t, text).unwrap().notes.join("; ");
         assert!(notes(&line.replace("13.3", "nan")).contains("a NaN or infinite"));
-        assert!(notes(&line.replace("4.4", "-1")).contains("no length"));
+        assert!(notes(&line.replace("4.4", "-1")).contains("length, width or height not positive"));
         let file = t.write("label_02/0000.txt", line);
         let calib =
             |text: &str| read(&file, &t.write("calib/0000.txt", text)).unwrap_err().to_string();
         assert!(calib("R_rect 1 0 0 0 1 0 0 0 1\n").ends_with("has no line `Tr_velo_cam`"));
         assert!(calib(&CALIB.replace("0.3", "")).contains("line 3: 12 numbers expected, 11"));
-        assert!(calib(&CALIB.replace("0 -1 0 0.1", "0 -2 0 0.1")).contains("is none"));
+        assert!(calib(&CALIB.replace("0 -1 0 0.1", "0 -2 0 0.1")).contains("is not a rotation"));
         let colon = CALIB.replace("R_rect", "R0_rect:").replace("velo_cam", "velo_to_cam:");
         assert!(read(&file, &t.write("calib/0000.txt", colon)).is_ok());
     }

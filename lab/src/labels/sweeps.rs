@@ -66,7 +66,7 @@ pub(super) fn fit(labels: &mut Labels, sweeps: &Sweeps) {
         }
     };
     note(without_sweep, "boxes left out: their frame has no sweep");
-    note(jumps, "jumps within tracks, which are cut there");
+    note(jumps, "jumps within tracks, which were cut there");
     let mut empty = vec![true; sweeps.moments.len()];
     for frame in labels.tracks.iter().flat_map(|t| t.boxes.keys()) {
         sweeps.index(*frame).into_iter().for_each(|i| empty[i] = false);
@@ -129,7 +129,7 @@ mod tests {
         let steady = fitted((0..6).map(|f| (f, at(5.0 * f as f64, 0.0))), 0.0);
         assert_eq!((steady.tracks.len(), steady.notes.len()), (1, 0));
         let jumping = fitted((0..6).map(|f| (f, at(if f < 2 { 0.0 } else { 8.0 }, 0.0))), 0.0);
-        assert_eq!(jumping.notes, ["1 jumps within tracks, which are cut there"]);
+        assert_eq!(jumping.notes, ["1 jumps within tracks, which were cut there"]);
         let parts: Vec<_> = jumping.tracks.iter().map(|t| (t.id.as_str(), t.boxes.len())).collect();
         assert_eq!(parts, [("a", 2), ("a/2", 4)]);
         assert_eq!(jumping.tracks[1].class, "Car");

@@ -46,7 +46,7 @@ impl<'a> File<'a> {
         let poses = self.child(item, "poses")?;
         for (n, pose) in self.items(poses)?.into_iter().enumerate() {
             if self.number::<u64>(pose, "state")? == UNSET {
-                gather.leave_out("boxes left out: nobody set their pose");
+                gather.leave_out("boxes left out: their pose was never set");
                 continue;
             }
             let number = |name: &str| self.number::<f64>(pose, name);
@@ -88,7 +88,7 @@ impl<'a> File<'a> {
             return Ok(items);
         }
         let name = list.tag_name().name();
-        Err(self.error(list, format!("<{name}> of {count} items has {}", items.len())))
+        Err(self.error(list, format!("<{name}> states {count} items but has {}", items.len())))
     }
 }
 
@@ -134,7 +134,7 @@ mod tests {
         let last = track.boxes[&7];
         assert!((last.translation - DVec3::new(11.0, 2.0, -0.7)).length() < 1e-12, "{last:?}");
         assert!((last.yaw_rad() - 1.5).abs() < 1e-12);
-        assert_eq!(labels.notes, ["1 boxes left out: nobody set their pose"]);
+        assert_eq!(labels.notes, ["1 boxes left out: their pose was never set"]);
     }
 
     #[test]
@@ -146,8 +146,11 @@ mod tests {
         };
         let whole = file();
         let cut = refused(&whole[..whole.len() / 2]);
-        assert!(cut.contains("tracklet_labels.xml, line ") && cut.contains("no XML"), "{cut}");
-        assert!(refused("").contains("no XML"));
+        assert!(
+            cut.contains("tracklet_labels.xml, line ") && cut.contains("not valid XML"),
+            "{cut}"
+        );
+        assert!(refused("").contains("not valid XML"));
         let without = |part: &str, instead: &str| refused(&whole.replace(part, instead));
         let entity = "<!DOCTYPE boost_serialization [<!ENTITY a \"b\">]>";
         assert!(
@@ -159,9 +162,12 @@ mod tests {
         assert!(without("<h>2</h>", "").ends_with("line 6: <item> has no <h>"));
         assert!(without("<h>2</h>", "<h>tall</h>").contains("<h>: `tall` is not a number"));
         assert!(
-            without("<count>3</count>", "<count>4</count>").contains("<poses> of 4 items has 3")
+            without("<count>3</count>", "<count>4</count>")
+                .contains("<poses> states 4 items but has 3")
         );
-        assert!(without("<count>1</count>", "<count>0</count>").contains("<tracklets> of 0 items"));
+        assert!(
+            without("<count>1</count>", "<count>0</count>").contains("<tracklets> states 0 items")
+        );
         assert!(without("<first_frame>5", "<first_frame>-5").contains("`-5` is not a number"));
         assert!(without("tracklets", "others").contains("has no <tracklets>"));
         assert!(without("<rz>1.5</rz>", "").contains("<item> has no <rz>"));
@@ -175,7 +181,7 @@ mod tests {
             read(&t.write("tracklet_labels.xml", text)).unwrap().notes.join("; ")
         };
         assert!(notes("<tx>10</tx>", "<tx>nan</tx>").contains("1 boxes left out: a NaN"));
-        assert!(notes("<w>1.8</w>", "<w>0</w>").contains("2 boxes left out: no length"));
-        assert!(notes("Van", "Zeppelin").contains("class `Zeppelin` is unknown: 1 tracks"));
+        assert!(notes("<w>1.8</w>", "<w>0</w>").contains("2 boxes left out: length, width"));
+        assert!(notes("Van", "Zeppelin").contains("unknown class `Zeppelin`: 1 tracks"));
     }
 }

@@ -31,14 +31,16 @@ pub fn read(
     let body = rest.len().saturating_sub(16);
     if rest.len() < 16 || !lengths.contains(&body) {
         let wanted = lengths.start();
-        return Err(error(&format!("of another length: {body} bytes, not {wanted}")));
+        return Err(error(&format!(
+            "has another length than expected: {body} bytes, not {wanted}"
+        )));
     }
     let word = |n: usize| u64::from_le_bytes(rest[8 * n..][..8].try_into().expect("8 bytes"));
     if Digest::of(&rest[8..]) != word(0) {
         return Err(error("checksum does not match: the file is damaged"));
     }
     if word(1) != of {
-        return Err(error("of another training: other inputs, seed or steps"));
+        return Err(error("from another training run: different inputs, seed or steps"));
     }
     Ok(rest[16..].to_vec())
 }

@@ -46,7 +46,7 @@ impl Log {
     pub fn open(path: &Path, truth: Option<&Path>, find_ground: bool) -> Result<Log, Error> {
         let (format, root) = source::recognise(path)?;
         if format != Format::Argoverse2 {
-            return Err(Error::input(&root, "", "is no Argoverse 2 log"));
+            return Err(Error::input(&root, "", "is not an Argoverse 2 log"));
         }
         let root = root.canonicalize().map_err(Error::reading(&root))?;
         let options = OpenOptions { format: Some(format), ..OpenOptions::default() };
@@ -80,7 +80,7 @@ impl Log {
         files.retain(|sweep, _| self.truth.contains_key(sweep));
         if let Some((sweep, truth)) = self.pairs().find(|(sweep, _)| !files.contains_key(sweep)) {
             let stamp = self.source.frame(sweep);
-            let what = format!("has no estimate of sweep {stamp}, but {} has", truth.display());
+            let what = format!("has no estimate of sweep {stamp}, but {} exists", truth.display());
             return Err(Error::input(&folder, "", what));
         }
         Ok(files)
@@ -99,7 +99,7 @@ impl Log {
         let mut points = Vec::with_capacity(flow.len());
         for (row, point) in first.points.iter().enumerate() {
             let category = Category::from_number(classes[row]).ok_or_else(|| {
-                let what = format!("classes_0 {} is none of -1 to 29", classes[row]);
+                let what = format!("classes_0 {} is not in -1 to 29", classes[row]);
                 Error::input(path, format!("row {row}"), what)
             })?;
             let city = first.world_from_vehicle.transform(position(point.position));
@@ -172,7 +172,7 @@ fn usual_truth(root: &Path) -> Result<PathBuf, Error> {
         let name = format!("{}_sceneflow_feather", split.file_name()?.to_str()?);
         Some(split.with_file_name(name).join(log))
     };
-    place().ok_or_else(|| Error::Usage("name the folder of the truth".into()))
+    place().ok_or_else(|| Error::Usage("give the folder of the truth with --truth".into()))
 }
 
 /// Files of flow in a folder by the index of their first sweep: by name if all names are stamps of
@@ -191,7 +191,7 @@ fn by_sweep(folder: &Path, source: &dyn Source) -> Result<BTreeMap<usize, PathBu
         files.into_iter().enumerate().map(|(n, (number, f))| (sweep(n, number), f)).collect();
     match files.last_key_value() {
         Some((&last, path)) if last + 1 >= source.len() => {
-            let what = format!("is flow from sweep {last} on, but there is none after it");
+            let what = format!("holds flow from sweep {last}, which has no successor");
             Err(Error::input(path, "", what))
         }
         _ => Ok(files),
@@ -213,7 +213,7 @@ fn numbered(folder: &Path) -> Result<Vec<(u64, PathBuf)>, Error> {
     files.sort_by(|a, b| a.1.cmp(&b.1));
     let numbers: BTreeSet<u64> = files.iter().map(|f| f.0).collect();
     if numbers.len() < files.len() {
-        return Err(Error::input(folder, "", "two names are the same number"));
+        return Err(Error::input(folder, "", "two names denote the same number"));
     }
     if files.is_empty() {
         return Err(Error::input(folder, "", "no flow: no file NUMBER.feather"));

@@ -78,7 +78,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
         println!("\n{}", row.name);
         if row.unvouched > 0 {
             println!(
-                "  {} returns that count are not valid in it: graded all the same",
+                "  {} returns that count are marked invalid in it: graded anyway",
                 row.unvouched
             );
         }

@@ -38,14 +38,14 @@ impl Ground {
     pub fn read(log: &Path) -> Result<Ground, Error> {
         let map = log.join("map");
         let is_heights = |n: &str| n.contains("_ground_height_surface____") && n.ends_with(".npy");
-        let heights = npy::read(&only(&map, "a raster of heights", is_heights)?)?;
+        let heights = npy::read(&only(&map, "a height raster", is_heights)?)?;
         let path = only(&map, "a Sim2", |n| n.ends_with("img_Sim2_city.json"))?;
         let text = fs::read_to_string(&path).map_err(Error::reading(&path))?;
         let sim: Sim2 =
             serde_json::from_str(&text).map_err(|e| Error::input(&path, "", e.to_string()))?;
         let numbers = [&sim.rotation[..], &sim.translation, &[sim.scale]].concat();
         if numbers.iter().any(|v| !v.is_finite()) || sim.scale <= 0.0 {
-            return Err(Error::input(&path, "", "a similarity with an impossible number"));
+            return Err(Error::input(&path, "", "the similarity has an invalid number"));
         }
         let [a, b, c, d] = sim.rotation;
         let rotation = DMat2::from_cols(DVec2::new(a, c), DVec2::new(b, d));

@@ -10,8 +10,8 @@ pub(super) fn figures(grades: &Grades) {
     println!("  three-way EPE within 35 m      returns     EPE (m)");
     let epe = |name: &str, b: Bucket| println!("    {name:<24}{:>10}{}", b.count, number(b.epe_m));
     epe("foreground, moving", three.foreground_dynamic);
-    epe("foreground, standing", three.foreground_static);
-    epe("background, standing", three.background_static);
+    epe("foreground, static", three.foreground_static);
+    epe("background, static", three.background_static);
     println!("    {:<34}{}", "mean", number(three.mean_epe_m()));
     accuracy("without the vehicle's motion", &grades.over_ground);
     accuracy("with the vehicle's motion", &grades.with_ego_motion);

@@ -179,7 +179,7 @@ impl Report {
                 Element::Chart(chart) => &chart.id,
                 Element::Picture(picture) => {
                     if picture.size().is_none() {
-                        let what = "is no PNG file";
+                        let what = "is not a PNG file";
                         return Err(Error::Usage(format!(
                             "report, picture {}: {what}",
                             picture.id
@@ -190,11 +190,11 @@ impl Report {
             };
             let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if id.is_empty() || !id.chars().all(plain) {
-                let what = "is no plain name (letters, digits, - and _)";
+                let what = "is not a plain name (letters, digits, - and _)";
                 return Err(Error::Usage(format!("report: {id:?} {what}")));
             }
             if !seen.insert(id) {
-                return Err(Error::Usage(format!("report: {id:?} is there twice")));
+                return Err(Error::Usage(format!("report: {id:?} is used twice")));
             }
         }
         Ok(())

@@ -86,7 +86,7 @@ pub fn write(day: &Path, rig: &Rig) -> Result<(), Error> {
                 std::io::Write::write_all(out, text.as_bytes())
             })?;
         } else if fs::read(&path).map_err(Error::reading(&path))? != text.as_bytes() {
-            let what = "belongs to drives of other sensors; write these to another folder";
+            let what = "belongs to drives with other sensors; use another folder for these";
             return Err(Error::input(&path, "", what));
         }
     }

@@ -115,7 +115,9 @@ impl Recipe {
     pub fn check(&self) -> Result<(), Error> {
         if self.motion != Motion::Any && self.scenery.place(self.seed).is_some() {
             let name = self.scenery.name();
-            let what = format!("--ego is for the street: {name} tells what the vehicle does");
+            let what = format!(
+                "--ego applies to the street only: {name} determines what the vehicle does"
+            );
             return Err(Error::Usage(what));
         }
         Ok(())
@@ -194,7 +196,7 @@ pub fn state(day: &Path, recipe: &Recipe, number: usize) -> Result<State, Error>
             Err(Error::input(&folder, "", what))
         }
         Err(_) => {
-            let what = "is there and is no drive of this program; choose another folder";
+            let what = "exists and is not a drive of this program; choose another folder";
             Err(Error::input(&folder, "", what))
         }
     }

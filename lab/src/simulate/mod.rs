@@ -92,7 +92,7 @@ fn clutters() -> impl TypedValueParser<Value = Clutter> {
 fn density(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     let fits = (0.0..=DENSITY_MAX).contains(&value);
-    fits.then_some(value).ok_or_else(|| format!("not within 0 to {DENSITY_MAX}"))
+    fits.then_some(value).ok_or_else(|| format!("not between 0 and {DENSITY_MAX}"))
 }
 
 /// What a run did.
@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let done = write(&args.out, &recipe, args.drives, args.jobs.unwrap_or_else(cores), false)?;
     let (sweeps, elapsed_s) = (done.drives * recipe.sweeps, start.elapsed().as_secs_f64());
     println!(
-        "{}: {} drives written, {} were there; {sweeps} sweeps in {elapsed_s:.1} s, {:.2} a second",
+        "{}: {} drives written, {} already there; {sweeps} sweeps in {elapsed_s:.1} s, {:.2} a second",
         args.out.display(),
         done.drives,
         done.skipped,

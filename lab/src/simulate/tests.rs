@@ -270,14 +270,14 @@ fn what_is_in_the_way() {
     assert!(text.contains("drive_0000_sync: holds another drive") && text.contains("\"seed\":6"));
     fs::rename(drive_folder(t.path(), 0), drive_folder(t.path(), 1)).unwrap();
     let text = refused(t.path(), &Recipe { sensor: "beam128".into(), ..small.clone() });
-    assert!(text.contains("calib_velo_to_cam.txt: belongs to drives of other sensors"), "{text}");
+    assert!(text.contains("calib_velo_to_cam.txt: belongs to drives with other sensors"), "{text}");
     fs::create_dir(drive_folder(t.path(), 0)).unwrap();
-    assert!(refused(t.path(), &small).contains("is there and is no drive of this program"));
+    assert!(refused(t.path(), &small).contains("exists and is not a drive of this program"));
     let text = refused(t.path(), &Recipe { sensor: "hdl65".into(), ..small });
     assert!(text.contains("hdl65"));
     let there = Recipe { scenery: Scenery::Outskirts, ..recipe("hdl64", Motion::Turn, 1) };
     let text = refused(t.path(), &there);
-    assert!(text.contains("--ego is for the street: outskirts"), "{text}");
+    assert!(text.contains("--ego applies to the street only: outskirts"), "{text}");
 }
 
 #[test]

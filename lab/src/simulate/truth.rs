@@ -227,7 +227,7 @@ pub fn read_objects(path: &Path) -> Result<Vec<ObjectTruth>, Error> {
         }
         let rotation = DQuat::from_xyzw(v[4], v[5], v[6], v[3]);
         if (rotation.length() - 1.0).abs() > 1e-6 {
-            return Err(bad("the quaternion has not length 1"));
+            return Err(bad("the quaternion does not have length 1"));
         }
         let class = CLASSES.iter().find(|&&c| class_name(c) == classes[n]);
         Ok(ObjectTruth {

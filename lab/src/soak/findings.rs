@@ -124,10 +124,14 @@ impl Findings {
             .fact("Time", &format!("{hours:.2} h"));
         let figures = [
             (self.sweeps().to_string(), "sweeps".into(), String::new()),
-            (self.wrong().to_string(), "clean stretches of another digest".into(), "0".into()),
+            (
+                self.wrong().to_string(),
+                "clean stretches with a different digest".into(),
+                "0".into(),
+            ),
             (
                 mebibytes(self.growth()),
-                format!("more memory than after {IN_USE} rounds"),
+                format!("memory growth since round {IN_USE}"),
                 format!("at most {}", mebibytes(GROWTH_MAX)),
             ),
         ];
@@ -149,14 +153,14 @@ impl Findings {
             Fault::value_variants().iter().zip(&self.of_fault).filter(met).map(row).collect();
         let mut table = Table::new(
             "faults",
-            "Stretches with a fault in their middle, and clean ones after them",
-            &["fault", "stretches", "then of the expected digest"],
+            "Stretches with a fault in the middle, and the clean ones after them",
+            &["fault", "stretches", "then with the expected digest"],
             rows,
         );
         let (failed, not_compared) = (self.devices_failed, self.not_compared);
         table.notes.push(format!(
-            "Devices that failed, with the scalar backend until the stretch's end and a new device \
-             after it: {failed}; in clean stretches, not compared: {not_compared}."
+            "Devices that failed (scalar backend until the end of the stretch, then a new device): \
+             {failed}; of these in clean stretches, and hence not compared: {not_compared}."
         ));
         table
     }
@@ -173,7 +177,12 @@ impl Findings {
         let known = self.periods.iter().enumerate().filter(|(_, period)| period.sweeps > 0);
         let rows = known.map(row).collect();
         let columns = ["part", "sweeps", "median, ms", "p99, ms", "max, ms", "memory, MiB"];
-        Table::new("time", "Time of a step, and memory at the end of each tenth", &columns, rows)
+        Table::new(
+            "time",
+            "Time of a step, and memory at the end of each tenth of the run",
+            &columns,
+            rows,
+        )
     }
 
     fn memory(&self) -> Chart {

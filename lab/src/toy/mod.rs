@@ -102,12 +102,16 @@ fn conclude(
     report.fact("Training", &args.training.text());
     report.fact("Time", &format!("{seconds:.0} s for both, side by side"));
     let [autoencoder, features] = both.each_ref().map(|l| 100.0 * l.right[CLASSES]);
-    report.headline(&format!("{features:.1} %"), "features", "of the test's digits told right");
+    report.headline(
+        &format!("{features:.1} %"),
+        "features",
+        "of the test digits classified correctly",
+    );
     report.headline(&format!("{autoencoder:.1} %"), "autoencoder", "with the same classifier");
     let section = report.section("Table 4.1");
     section.table(table(both));
     for (learned, id) in both.iter().zip(["figure-4-2", "figure-4-3"]) {
-        let title = format!("Encodings of the test's digits: {}", learned.lesson);
+        let title = format!("Encodings of the test digits: {}", learned.lesson);
         report.section(&title).chart(figure(id, learned, &sets.test));
     }
     report.write(&args.out)
@@ -123,8 +127,13 @@ fn table(both: &[Learned; 2]) -> Table {
     let columns = ["digit", "autoencoder, %", "features, %"];
     let published = ["published: autoencoder, %", "published: features, %"];
     let columns: Vec<&str> = columns.into_iter().chain(published).collect();
-    Table::new("table-4-1", "Table 4.1: digits told right by two numbers", &columns, rows.collect())
-        .note("The dissertation trained with 60,000 digits and tested with 10,000.")
+    Table::new(
+        "table-4-1",
+        "Table 4.1: digits classified correctly from two numbers",
+        &columns,
+        rows.collect(),
+    )
+    .note("The dissertation trained with 60,000 digits and tested with 10,000.")
 }
 
 fn figure(id: &str, learned: &Learned, digits: &Digits) -> Chart {
@@ -134,6 +143,6 @@ fn figure(id: &str, learned: &Learned, digits: &Digits) -> Chart {
         let name = digit.to_string();
         plot.series.push(Series { name, points, style: Style::Dots, marks: Vec::new() });
     }
-    let caption = format!("A dot for each digit of the test: {}", learned.lesson);
+    let caption = format!("One dot per test digit: {}", learned.lesson);
     Chart::new(id, &caption, Plot::Lines(plot))
 }

@@ -55,14 +55,14 @@ pub fn methods() -> [(&'static str, Method); 18] {
         ),
         ("as printed, damped", of(EstimateParams { damping: true, ..printed })),
         ("as printed, carved by rays", of(EstimateParams { free_space: carving(3), ..printed })),
-        ("ours without ends", of(EstimateParams { endpoints, ..ours })),
+        ("ours without endpoints", of(EstimateParams { endpoints, ..ours })),
         ("ours without passing rays", of(EstimateParams { passing: false, ..ours })),
         ("ours not carved", of(EstimateParams { free_space: carving(0), ..ours })),
         ("ours not grown", of(EstimateParams { growth, ..ours })),
         ("ours from one start", of(EstimateParams { multi_start: false, ..ours })),
         ("ours without surfaces", of(EstimateParams { surfaces: false, ..ours })),
         ("ours, Gaussian turns", of(EstimateParams { student_dof: 0.0, ..ours })),
-        ("baseline EKF, at the time", Method::BaselineLive),
+        ("baseline EKF, live", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]
 }

@@ -39,7 +39,7 @@ pub fn convergence(sets: &[Set]) -> Chart {
         part("distance, ours", "mean distance, m", OURS..MAIN, |c| c.residual_m),
     ];
     let caption = "As figure 2.5: cost J, and mean distance of a return from its model point, \
-        after each iteration; mean over tracks, of which those that have ended stay as they are.";
+        after each iteration; mean over tracks, where those that have ended keep their last value.";
     Chart::small_multiples("figure-2-5", caption, parts)
 }
 

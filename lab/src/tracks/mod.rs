@@ -185,7 +185,7 @@ fn conclude(
 }
 
 const FRONT_ENDS: &str = "Above, segmentation and association are perfect. Here the labelled \
-    objects are followed as the front ends find them; each object counts by its longest track.";
+    objects are followed as found by the front ends; each object counts by its longest track.";
 
 /// What the front ends find, and the errors of the resulting tracks.
 fn front_ends(found: &[(&'static str, Found)]) -> Vec<Table> {
@@ -257,10 +257,10 @@ fn choices() -> String {
         "Simulated objects are seen by four HDL-32E from a moving vehicle with exact poses: {}\n\n\
          Recorded ones are the returns in labelled boxes above the ground, each at its own time; \
          the truth of moving ones is their smoothed labels, whose own errors count as ours.\n\n\
-         The baseline's states before it has found out which way an object looks are revised, as \
-         they are where the proposed tracker starts from them. Its poses between two batches lie \
-         on the line that joins them. All are compared at the mean time of every batch.\n\n\
-         A heading flips where it leaps by more than a right angle against the truth, or is \
+         The baseline's states before it has found out which way an object faces are revised, as \
+         they are where the proposed tracker starts from them. Its poses between two batches are \
+         interpolated linearly. All are compared at the mean time of every batch.\n\n\
+         A heading flips if it jumps by more than a right angle relative to the truth, or is \
          farther than that from it over the whole track.",
         simulated::rule()
     )

@@ -96,11 +96,11 @@ impl Wanted {
 pub fn rule() -> String {
     let ([least, most], [parked, of_a_kind]) = (BATCHES, PER_DRIVE);
     format!(
-        "{RETURNS} returns at least, over the longest stretch of sweeps with {BATCH_RETURNS} \
-         returns at least and no gap of more than {GAP_BATCHES} sweeps, which is {least} sweeps \
-         long at least and cut to {most} about the sweep of most returns. Up to {parked} parked \
-         vehicles of a drive and {of_a_kind} moving objects of a kind, which go {MOVED_M} m at \
-         least."
+        "At least {RETURNS} returns, over the longest stretch of sweeps with at least \
+         {BATCH_RETURNS} returns and no gap of more than {GAP_BATCHES} sweeps, which is at least \
+         {least} sweeps long and cut to {most} around the sweep with most returns. Up to {parked} \
+         parked vehicles from a drive and {of_a_kind} moving objects of a kind, which cover at \
+         least {MOVED_M} m."
     )
 }
 

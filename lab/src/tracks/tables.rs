@@ -77,7 +77,7 @@ impl Set {
     /// Number of objects, and how long and by how many returns they are seen.
     pub fn about(&self) -> String {
         format!(
-            "{}: {} objects, each seen for {:.2} s by {:.0} returns in the mean",
+            "{}: {} objects, each seen for {:.2} s by {:.0} returns on average",
             self.name,
             self.outcomes.len(),
             self.mean(|o| o.span_s),
@@ -116,13 +116,13 @@ pub fn errors(set: &Set) -> Table {
     let count = set.outcomes.iter().filter(|o| straight(o)).count();
     if (1..set.outcomes.len()).contains(&count) {
         for n in [0, OURS] {
-            let name = format!("{}: the {count} that go straight on", methods()[n].0);
+            let name = format!("{}: the {count} that go straight", methods()[n].0);
             rows.push(error_row(set, &name, n, straight));
         }
     }
     let against = match stationary {
         true => "position and heading about their means, velocity and heading rate from zero",
-        false => "against the truth at the same point of the body, by one transform for a track",
+        false => "against the truth at the same point of the body, after one transform per track",
     };
     let caption = format!(
         "As table 2.1, {}. Root mean squares over the batches of all tracks: {against}.",
@@ -163,14 +163,14 @@ pub fn by_distance(set: &Set) -> Table {
             let ratios = [0, 1, 2, 3].map(|n| errors[n] / baseline[n]);
             let name = match most.is_finite() {
                 true => format!("{name}, {least} to {most} m"),
-                false => format!("{name}, {least} m and more"),
+                false => format!("{name}, {least} m or more"),
             };
             let all = [count as f64].into_iter().chain(errors).chain(ratios);
             rows.push(TableRow::new(numbers(&name, all, 3)));
         }
     }
     let caption = format!(
-        "Table 2.1 by the range of an object's nearest return, {}; and errors as multiples of the \
+        "Table 2.1 by the range of an object's nearest return, {}; also errors as multiples of the \
          baseline's.",
         set.name
     );
@@ -196,7 +196,7 @@ fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool
 pub fn wandering(labels: &Errors) -> TableRow {
     let r = labels.rmse();
     let all = [r.position, r.ground, r.height, f64::NAN, r.heading, f64::NAN, f64::NAN];
-    let cells = numbers("the labels, with the poses' drift", all, 3);
+    let cells = numbers("the labels, including the poses' drift", all, 3);
     TableRow::reference(cells.into_iter().chain([Cell::Empty]))
 }
 
@@ -216,14 +216,15 @@ pub fn better(set: &Set) -> Table {
         let work = [set.mean(|o| iterations(&o.scores[n])), ms];
         TableRow::new(numbers(methods()[n].0, shares.chain(work), 1))
     };
-    let caption = format!("Tracks of which the error is less than the baseline's, {}.", set.name);
+    let caption =
+        format!("Share of tracks with a smaller error than the baseline's, {}.", set.name);
     let columns = "Tracker | Position, % | Velocity, % | Heading, % | Heading rate, % \
         | Entropy, % | Iterations | Time, ms";
     let rows = (1..methods().len()).map(row).collect();
     let mut table = table(format!("better-{}", set.id), caption, columns, rows);
     table.notes.push(
-        "Iterations are those that led to the estimate; the time is that of all there were, of the \
-         fixed lag for all batches of a track."
+        "Iterations are those that led to the estimate; the time is for all of them, for the fixed \
+         lag over all batches of a track."
             .into(),
     );
     table
@@ -253,7 +254,7 @@ pub fn entropies(sets: &[Set]) -> Table {
     let columns =
         format!("Set | Truth | {names} | Gap closed as printed, % | Gap closed by ours, %");
     let caption = "As table 2.2: entropy of the clouds of all returns in the object's frame, sigma \
-        5 cm, nats, mean over tracks; the gap is that of the baseline to the truth.";
+        5 cm, nats, mean over tracks; the gap is between the baseline and the truth.";
     table("entropy".into(), caption.into(), &columns, rows)
 }
 
@@ -318,7 +319,7 @@ pub fn extents(sets: &[Set]) -> Table {
         }
     }
     let caption = "Extent of vehicles: median difference between the narrowest box around the \
-        cloud and the vehicle's own. That of the truth is what is never seen.";
+        cloud and the vehicle's own. That of the truth is due to what is never seen.";
     let columns = "Set | Vehicles | Cloud by | Length, m | Width, m | Height, m";
     table("extents".into(), caption.into(), columns, rows)
 }
@@ -366,9 +367,9 @@ pub fn front_ends(found: &[(&'static str, Found)]) -> Table {
         ];
         TableRow::new([Cell::from(*name)].into_iter().chain(counts.map(Cell::from)))
     };
-    let caption = "What the front ends find of labelled objects. A track is an object's where more \
-        than half of its returns lie in the object's box; fragments are the tracks of an object \
-        beyond its first, and a swap is a track that goes over from an object to another.";
+    let caption = "What the front ends find of labelled objects. A track belongs to an object if \
+        more than half of its returns lie in the object's box; fragments are the tracks of an \
+        object beyond its first, and a swap is a track switching from one object to another.";
     let columns = "Front end | Labelled objects | Found | Tracks | Of labelled objects \
         | Fragments | Swaps";
     table("front-ends".into(), caption.into(), columns, found.iter().map(row).collect())

@@ -96,7 +96,7 @@ fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report
     }
     let counts = [&training, &held_out].map(|s| Counts::of(s.iter().map(|s| s.same)));
     for (count, part) in counts.iter().zip(["training", "held-out"]) {
-        count.both(part, "columns of objects", "other columns to tell them from")?;
+        count.both(part, "columns of objects", "other columns to distinguish them from")?;
     }
     let (learned, checked) = (data(&training, RIDGE), data(&held_out, 0.0));
     let mut progress = Vec::new();
@@ -109,7 +109,7 @@ fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report
     let ours = measure("written", &write("untold"), &checked, &pairs)?;
     let provenance = format!(
         "raywake-lab train constancy{option}, {inputs}, logistic regression, held-out log loss \
-         {:.4}, AUC {:.4}, true target first {:.3} standing {:.3} moving",
+         {:.4}, AUC {:.4}, true target first {:.3} stationary {:.3} moving",
         ours.log_loss, ours.auc, ours.standing.first, ours.moving.first
     );
     let mut measured = vec![ours];

@@ -43,8 +43,8 @@ struct Report {
 pub fn run(args: &Args) -> Result<(), Error> {
     let [training, held_out] = samples(&args.results)?;
     let counts = [&training, &held_out].map(|d| Counts::of(d.labels.iter().copied()));
-    counts[0].both("training", "columns that move", "columns that stand")?;
-    counts[1].both("held-out", "columns that move", "columns that stand")?;
+    counts[0].both("training", "columns that move", "columns that are static")?;
+    counts[1].both("held-out", "columns that move", "columns that are static")?;
     let mut progress = Vec::new();
     let weights = training.fit(&mut |weights, training| {
         progress.push(Progress { training, held_out: held_out.loss(weights) });

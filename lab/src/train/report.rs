@@ -57,7 +57,7 @@ impl Counts {
             Counts { negative: 0, .. } => negative,
             _ => return Ok(()),
         };
-        Err(Error::Usage(format!("the {part} drives hold no {missing}")))
+        Err(Error::Usage(format!("the {part} drives contain no {missing}")))
     }
 }
 
@@ -70,7 +70,9 @@ mod tests {
         let counts = |labels: &[bool]| Counts::of(labels.iter().copied());
         let error = |labels: &[bool]| counts(labels).both("held-out", "cars", "trees");
         assert!(error(&[true, false]).is_ok());
-        assert!(error(&[false]).unwrap_err().to_string().contains("held-out drives hold no cars"));
+        assert!(
+            error(&[false]).unwrap_err().to_string().contains("held-out drives contain no cars")
+        );
         assert!(error(&[true]).unwrap_err().to_string().contains("no trees"));
         assert!(error(&[]).is_err());
     }

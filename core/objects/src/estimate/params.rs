@@ -11,17 +11,17 @@ raywake_core::params! {
         /// Number of model points (`n_m`).
         pub model_points: usize = 300, "points", (1 to 3000), "Dissertation, section 2.6.2.";
         /// Time between knots.
-        pub basis_s: f64 = 0.3, "s", (0.05 to 10), "The dissertation has 0.5 s.";
+        pub basis_s: f64 = 0.3, "s", (0.05 to 10), "The dissertation uses 0.5 s.";
         /// Standard deviation of a model point about the origin.
         pub shape_sigma_m: f64 = 10.0, "m", (above 0), "Dissertation, section 2.6.2.";
         /// Standard deviation of a return about its model point (`σ_z`).
-        pub return_sigma_m: f64 = 0.05, "m", (above 0), "The dissertation has 0.5 m.";
+        pub return_sigma_m: f64 = 0.05, "m", (above 0), "The dissertation uses 0.5 m.";
         /// Maximum number of Gauss-Newton iterations of a descent.
         pub iterations: usize = 10, "iterations", (0 to 64), "Dissertation, section 2.6.2.";
         /// A descent has converged when an iteration lowers the cost by no more than this fraction.
         pub convergence: f64 = 1e-4, "", (0 to 1);
         /// Whether steps that raise the cost are undone and damped (Levenberg-Marquardt).
-        pub damping: bool = true, "", (any), "`raywake-lab eval tracks` has a row of it alone.";
+        pub damping: bool = true, "", (any), "`raywake-lab eval tracks` has a row with this alone.";
         /// Damping of the first iteration, a fraction of the diagonal.
         pub damping_first: f64 = 1e-4, "", (0 to 1);
         /// Factor of the damping after a step that raised the cost.
@@ -41,7 +41,7 @@ raywake_core::params! {
         /// any length. Turn rate noise is inversely proportional to the length, as is the speed
         /// noise of longer objects; shorter ones have closer knots, and their returns are less free
         /// along surfaces; `shape_sigma_m` is at most the length.
-        pub reference_length_m: f64 = 4.5, "m", (0 to 100), "A car's.";
+        pub reference_length_m: f64 = 4.5, "m", (0 to 100), "Length of a car.";
         /// Objects that appear shorter are taken to be this long.
         pub length_min_m: f64 = 0.6, "m", (above 0);
         /// Objects that appear longer are taken to be this long.

@@ -44,9 +44,9 @@ raywake_core::params! {
         /// Standard deviation of a segment's velocity by the flow.
         pub segment_velocity_sigma_mps: f64 = 0.7, "m/s", (above 0);
         /// Distance along x or y from a track within which the gate is computed.
-        pub coarse_gate_m: f64 = 5.0, "m", (above 0), "Saves time alone: wider than any gate.";
+        pub coarse_gate_m: f64 = 5.0, "m", (above 0), "Only saves time: wider than any gate.";
         /// Growth of that distance since the track's last update.
-        pub coarse_gate_mps: f64 = 45.0, "m/s", (above 0), "Saves time alone: faster than any car.";
+        pub coarse_gate_mps: f64 = 45.0, "m/s", (above 0), "Only saves time: faster than any car.";
         /// Time without an observation after which a track ends.
         pub patience_s: f64 = 0.5, "s", (0 to 60);
         /// Mean P(moves) of its returns from which a track counts as moving.

@@ -175,7 +175,7 @@ pub fn create_folder(path: &Path) -> Result<(), Error> {
 /// The temporary path.
 fn partial_path(path: &Path) -> Result<PathBuf, Error> {
     let name = path.file_name().ok_or_else(|| {
-        Error::writing(path)(io::Error::new(io::ErrorKind::InvalidInput, "is not a file name"))
+        Error::writing(path)(io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))
     })?;
     let partial = [OsStr::new("."), name, OsStr::new(".partial")].join(OsStr::new(""));
     Ok(path.with_file_name(partial))

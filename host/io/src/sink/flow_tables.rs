@@ -139,7 +139,7 @@ impl Folders {
             return atomic::write(&path, |out| std::io::Write::write_all(out, &bytes));
         }
         if whole::read(&path)? != bytes {
-            let what = "is not what this run finds: choose another folder, or delete it";
+            let what = "differs from this run's result: choose another folder, or delete it";
             return Err(Error::Usage(format!("{} {what}", path.display())));
         }
         self.checked[kind] = true;

@@ -217,7 +217,7 @@ mod tables {
         write(7, &rows).unwrap();
         assert_eq!(time(), first);
         let e = write(7, &[]).unwrap_err();
-        assert!(e.to_string().contains("0000000007.feather is not what this run finds"), "{e}");
+        assert!(e.to_string().contains("0000000007.feather differs from this run's result"), "{e}");
         assert_eq!((e.exit_code(), time()), (2, first));
         // Once the tables are known to be the same, they are not read again.
         let mut tables = FlowTables::folders(t.path(), false).unwrap();

@@ -57,13 +57,13 @@ impl Argoverse {
     /// Opens the log in this folder.
     pub fn open(root: &Path, options: &OpenOptions) -> Result<Argoverse, Error> {
         if options.poses.is_some() || options.poses_frame.is_some() {
-            let what = "Argoverse 2 logs bring their own poses; --poses does not apply";
+            let what = "Argoverse 2 logs contain their own poses; --poses does not apply";
             return Err(Error::Usage(what.into()));
         }
         let clouds = root.join("sensors/lidar");
         let (files, by_number) = numbered(&clouds, "feather")?;
         if !by_number {
-            return Err(Error::input(&clouds, "", "a sweep's name is not a timestamp"));
+            return Err(Error::input(&clouds, "", "the name of a sweep is not a timestamp"));
         }
         let mut notes = Vec::new();
         let path = root.join("city_SE3_egovehicle.feather");
@@ -115,8 +115,7 @@ impl Argoverse {
         let offsets = table.integers("offset_ns")?;
         let lasers = table.integers("laser_number")?;
         if let Some(row) = lasers.iter().position(|l| !(0..2 * LASERS).contains(l)) {
-            let what =
-                format!("laser_number {} is not one of 0 to {}", lasers[row], 2 * LASERS - 1);
+            let what = format!("laser_number {} is not in 0 to {}", lasers[row], 2 * LASERS - 1);
             return Err(Error::input(path, format!("row {row}"), what));
         }
         into.points.extend((0..table.rows()).map(|i| Point {
@@ -248,7 +247,7 @@ impl<'a> PoseTable<'a> {
             return Err(Error::input(self.path, place(), "a pose with a NaN or infinite number"));
         }
         if (q.length() - 1.0).abs() > 1e-3 {
-            return Err(Error::input(self.path, place(), "the quaternion is not of length 1"));
+            return Err(Error::input(self.path, place(), "the quaternion does not have length 1"));
         }
         Ok(Pose::new(q, t))
     }

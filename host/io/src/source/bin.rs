@@ -28,10 +28,10 @@ impl BinFields {
     pub fn parse(text: &str) -> Result<BinFields, String> {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         if names.len() > NUMBERS_MAX {
-            return Err(format!("{} numbers a return, at most {NUMBERS_MAX}", names.len()));
+            return Err(format!("{} numbers per return, at most {NUMBERS_MAX}", names.len()));
         }
         if let Some(n) = (0..names.len()).find(|&n| names[..n].contains(&names[n])) {
-            return Err(format!("`{}` is there twice", names[n]));
+            return Err(format!("`{}` is given twice", names[n]));
         }
         let fields = BinFields(names);
         fields.find().map_err(|what| format!("{what}: expected x,y,z,..."))?;
@@ -69,7 +69,7 @@ pub(super) fn read(
     let (width, names) = (fields.0.len(), fields.0.join(", "));
     if !rest.is_empty() || numbers.len() % width != 0 {
         return Err(wrong(format!(
-            "{} bytes, not a multiple of {} (float32 {names}): truncated, or other numbers \
+            "{} bytes, not a multiple of {} (float32 {names}): truncated, or other fields \
              (--bin-fields)?",
             bytes.len(),
             NUMBER * width,
@@ -79,7 +79,7 @@ pub(super) fn read(
     let rows = numbers.len() / width;
     let negative = (0..rows).filter(|row| told.is_none() && value(*row, 3) < 0.0).count();
     if negative as f64 > NEGATIVE_MAX * rows as f64 {
-        let what = format!("{negative} of {rows} intensities are negative: other numbers than");
+        let what = format!("{negative} of {rows} intensities are negative: other fields than");
         return Err(wrong(format!("{what} float32 {names}? (--bin-fields)")));
     }
     let found = fields.find().map_err(wrong)?;
@@ -122,7 +122,7 @@ mod tests {
         // Read as four floats each, every fifth intensity would be x.
         let path = t.write("a.bin", floats(&five));
         let what = read(&path, None, &mut points).unwrap_err().to_string();
-        assert!(what.contains("of 25 intensities are negative: other numbers"), "{what}");
+        assert!(what.contains("of 25 intensities are negative: other fields"), "{what}");
         let what = read(&t.write("b.bin", floats(&five[..5])), None, &mut points);
         let what = what.unwrap_err().to_string();
         assert!(what.contains("20 bytes, not a multiple of 16 (float32 x, y, z, i"), "{what}");
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!((points[0].offset_s, points[0].position), (0.05, [1.0, 2.0, -3.0]));
         let refused = |text: &str| BinFields::parse(text).unwrap_err();
         assert_eq!(refused("x,y,i"), "has no field `z`: expected x,y,z,...");
-        assert_eq!(refused("x,y,z,x"), "`x` is there twice");
+        assert_eq!(refused("x,y,z,x"), "`x` is given twice");
     }
 
     #[test]

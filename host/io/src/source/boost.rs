@@ -24,8 +24,9 @@ pub fn read<T>(path: &Path, each: impl FnOnce(&Document) -> Result<T, Error>) ->
     check_size(&text).map_err(|what| Error::input(path, "", what))?;
     let options =
         ParsingOptions { allow_dtd: true, nodes_limit: NODES_MAX, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(&text, options)
-        .map_err(|e| Error::input(path, format!("line {}", e.pos().row), format!("no XML: {e}")))?;
+    let document = Document::parse_with_options(&text, options).map_err(|e| {
+        Error::input(path, format!("line {}", e.pos().row), format!("not valid XML: {e}"))
+    })?;
     each(&document)
 }
 

@@ -44,7 +44,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let footer = root_as_footer(&body[start..]).map_err(|e| format!("damaged footer: {e}"))?;
     // Dictionaries are unpacked even if their column is not requested, and none is needed here.
     if footer.dictionaries().is_some_and(|blocks| !blocks.is_empty()) {
-        return Err("has columns coded by dictionary: write them plainly".into());
+        return Err("has dictionary-encoded columns: write them as plain columns".into());
     }
     let mut claims = Claims::default();
     for block in footer.recordBatches().into_iter().flatten() {

@@ -67,7 +67,7 @@ pub(super) fn learn(
     let offsets = |[from_s, span_s]: [f64; 2]| Timing::Offset { from_s, span_s };
     rig.timing = span.map_or(Timing::AtStamp, offsets);
     if !timed {
-        notes.push("returns have no time: motion within a sweep is not corrected".into());
+        notes.push("returns have no times: motion within a sweep is not corrected".into());
     }
     let found = options.ground_m.or_else(|| raywake_registration::ground::ground_height(points));
     let ground_m =
@@ -90,7 +90,7 @@ fn mount(rig: &mut Rig, names: &[&str], notes: &mut Vec<String>) {
         if let Some(place) = mounting::above(ground_m).filter(|_| own_frame) {
             pose.translation = place;
             notes.push(format!(
-                "{name}: the origin is close to the ground; the sensor is taken to be {:.2} m \
+                "{name}: the origin is close to the ground; the sensor is assumed to be {:.2} m \
                  above it",
                 place.z - ground_m
             ));

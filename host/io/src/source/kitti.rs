@@ -169,7 +169,7 @@ impl Opening {
         if options.poses_frame.unwrap_or(usual) == PosesFrame::Camera {
             let calib = self.root.join("calib.txt");
             if !calib.is_file() {
-                let what = "poses of the camera need `calib.txt` beside the clouds; \
+                let what = "camera poses need `calib.txt` next to the clouds; \
                             or, if they are of the clouds' frame, --poses-frame vehicle";
                 return Err(Error::input(path, "", what));
             }
@@ -220,7 +220,7 @@ impl Opening {
             return oxts::read_calibration(&path);
         }
         self.notes.push(format!(
-            "no {name} in the drive or above it: IMU taken 0.81 m behind, 0.32 m beside and \
+            "no {name} in the drive or above it: IMU assumed 0.81 m behind, 0.32 m beside and \
              0.80 m below the Velodyne, axes parallel"
         ));
         Ok(oxts::default_velo_from_imu())

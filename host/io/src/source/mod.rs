@@ -302,13 +302,13 @@ formats! {
     /// Waymo Open Dataset segments in Parquet.
     Waymo {
         marks: ["lidar_calibration"], holds: recognise::is_waymo,
-        files: [], topics: true, open: waymo::Waymo::open, if "parquet": "Waymo's segments"
+        files: [], topics: true, open: waymo::Waymo::open, if "parquet": "a Waymo dataset"
     }
     /// nuScenes scenes.
     #[value(name = "nuscenes")]
     NuScenes {
         marks: [recognise::SCENES], holds: recognise::is_nuscenes,
-        files: [], topics: true, open: nuscenes::NuScenes::open, if "nuscenes": "nuScenes"
+        files: [], topics: true, open: nuscenes::NuScenes::open, if "nuscenes": "a nuScenes dataset"
     }
     /// A ROS recording: an `.mcap` file, or a folder of them.
     Mcap {
@@ -319,7 +319,7 @@ formats! {
     /// Packets of an Ouster or Velodyne sensor in a `.pcap` or `.pcapng` file.
     Pcap {
         marks: [], holds: |_| Ok(false), files: ["pcap", "pcapng"], topics: true,
-        open: capture::Capture::open, if "pcap": "a capture of packets"
+        open: capture::Capture::open, if "pcap": "a packet capture"
     }
     /// A folder of `.bin`, `.npy`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
@@ -352,11 +352,11 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
     if !format.row().topics && !options.topics.is_empty() {
         let names = FORMATS.iter().filter(|r| r.topics).filter_map(|r| r.kind.to_possible_value());
         let names: Vec<_> = names.map(|n| n.get_name().to_string()).collect();
-        let what = format!("only recordings in {} have topics (--topic)", names.join(", "));
+        let what = format!("--topic applies only to recordings in {}", names.join(", "));
         return Err(Error::Usage(what));
     }
     if format != Format::Mcap && options.extrinsics.is_some() {
-        return Err(Error::Usage("--extrinsics is for recordings in MCAP".into()));
+        return Err(Error::Usage("--extrinsics applies only to MCAP recordings".into()));
     }
     let source = (format.row().open)(&root, options)?;
     plausible::check(source.overview()).map_err(|what| Error::input(&root, "", what))?;

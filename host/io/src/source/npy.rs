@@ -31,7 +31,7 @@ pub fn read(path: &Path) -> Result<Array, Error> {
 
 /// Parses a file; `Err` says what is wrong.
 fn parse(bytes: &[u8]) -> Result<Array, String> {
-    let rest = bytes.strip_prefix(MAGIC).ok_or("is no NumPy file")?;
+    let rest = bytes.strip_prefix(MAGIC).ok_or("is not a NumPy file")?;
     let (header, data) = split(rest).ok_or("truncated within the header")?;
     let header = std::str::from_utf8(header).map_err(|_| "the header is not UTF-8 text")?;
     let kind = value(header, "descr")?.trim_matches(['\'', '"']);
@@ -39,17 +39,19 @@ fn parse(bytes: &[u8]) -> Result<Array, String> {
         "<f2" => |b| f16::from_le_bytes(all(b)).into(),
         "<f4" => |b| f32::from_le_bytes(all(b)).into(),
         "<f8" => |b| f64::from_le_bytes(all(b)),
-        other => return Err(format!("holds `{other}`; <f2, <f4 or <f8 expected")),
+        other => return Err(format!("holds `{other}`; expected <f2, <f4 or <f8")),
     };
     if value(header, "fortran_order")? != "False" {
-        return Err("is stored column after column; rows expected".into());
+        return Err("is stored in column-major order; row-major expected".into());
     }
     let [rows, columns] = shape(header)?;
     let width = usize::from(kind.as_bytes()[2] - b'0');
     let size = rows.checked_mul(columns).and_then(|n| n.checked_mul(width));
     if size != Some(data.len()) {
         let found = data.len();
-        return Err(format!("{found} bytes of data, but {rows} x {columns} numbers of {width}"));
+        return Err(format!(
+            "{found} bytes of data for {rows} x {columns} numbers of {width} bytes"
+        ));
     }
     Ok(Array { rows, columns, values: data.chunks_exact(width).map(number).collect() })
 }
@@ -81,7 +83,7 @@ fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
 fn shape(header: &str) -> Result<[usize; 2], String> {
     let (_, after) = header.split_once("'shape':").ok_or("the header has no `shape`")?;
     let inside = after.trim_start().strip_prefix('(').and_then(|s| Some(s.split_once(')')?.0));
-    let inside = inside.ok_or("the shape is none")?;
+    let inside = inside.ok_or("the shape is invalid")?;
     let size = |s: &str| s.trim().parse().ok();
     let sizes: Option<Vec<usize>> = inside.split(',').map(size).collect();
     let columns = |rest: &[usize]| rest.iter().try_fold(1_usize, |n, size| n.checked_mul(*size));
@@ -89,7 +91,7 @@ fn shape(header: &str) -> Result<[usize; 2], String> {
         Some([rows, rest @ ..]) if !rest.is_empty() && !rest.contains(&0) => {
             Ok([*rows, columns(rest).ok_or("the shape is too large")?])
         }
-        _ => Err(format!("of shape ({inside}); rows and columns expected, columns above zero")),
+        _ => Err(format!("has shape ({inside}); expected rows and columns, columns above zero")),
     }
 }
 
@@ -126,16 +128,16 @@ mod tests {
         let refused = |header: &str, data: &[u8]| parse(&file(header, data)).unwrap_err();
         let good = "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 1), }";
         assert!(parse(&file(good, &[0; 4])).is_ok());
-        assert!(refused(good, &[0; 3]).starts_with("3 bytes of data, but 1 x 1"));
+        assert!(refused(good, &[0; 3]).starts_with("3 bytes of data for 1 x 1"));
         assert!(refused(&good.replace("<f4", "<i4"), &[0; 4]).starts_with("holds `<i4`"));
-        assert!(refused(&good.replace("False", "True"), &[0; 4]).contains("column after column"));
+        assert!(refused(&good.replace("False", "True"), &[0; 4]).contains("column-major"));
         assert!(refused(&good.replace("(1, 1)", "(1, 0)"), &[]).contains("above zero"));
         assert!(refused(&good.replace("(1, 1)", "(1,)"), &[0; 4]).contains("shape (1,)"));
-        assert!(refused(&good.replace("(1, 1)", "1"), &[0; 4]).contains("shape is none"));
+        assert!(refused(&good.replace("(1, 1)", "1"), &[0; 4]).contains("shape is invalid"));
         let huge = good.replace("(1, 1)", "(4294967296, 4294967296)");
         assert!(refused(&huge, &[0; 4]).contains("4 bytes of data"));
         assert!(refused("{}", &[]).contains("no `descr`"));
-        assert_eq!(parse(b"PK").unwrap_err(), "is no NumPy file");
+        assert_eq!(parse(b"PK").unwrap_err(), "is not a NumPy file");
         let whole = file(good, &[0; 4]);
         assert!((0..whole.len()).all(|cut| parse(&whole[..cut]).is_err()));
     }

@@ -90,7 +90,7 @@ impl NuScenes {
     /// folder of them.
     pub fn open(root: &Path, options: &OpenOptions) -> Result<NuScenes, Error> {
         if options.poses.is_some() || options.poses_frame.is_some() {
-            let what = "scenes of nuScenes bring their own poses; --poses does not apply";
+            let what = "nuScenes scenes contain their own poses; --poses does not apply";
             return Err(Error::Usage(what.into()));
         }
         let tables = tables(root)?;
@@ -186,9 +186,9 @@ fn scene(tables: &Path, topics: &[String]) -> Result<SceneRow, Error> {
         [] => format!("{} scenes, choose with --topic: {}", scenes.len(), names(&scenes)),
         [asked] => match scenes.iter().position(|scene| scene.name == *asked) {
             Some(n) => return Ok(scenes.remove(n)),
-            None => format!("no scene {asked}; there are: {}", names(&scenes)),
+            None => format!("no scene {asked}; available: {}", names(&scenes)),
         },
-        _ => return Err(Error::Usage("one scene at a time (--topic)".into())),
+        _ => return Err(Error::Usage("only one scene at a time (--topic)".into())),
     };
     Err(Error::input(&path, "", what))
 }

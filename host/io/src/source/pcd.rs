@@ -91,7 +91,7 @@ fn unpack(
     })?;
     let length = |n: usize| Number::Unsigned(4).read(&lengths[4 * n..], false) as usize;
     if length(1) != size {
-        return Err(wrong(format!("unpacks to {} bytes, the header asks for {size}", length(1))));
+        return Err(wrong(format!("unpacks to {} bytes, the header expects {size}", length(1))));
     }
     let packed = rest.get(..length(0)).ok_or_else(|| {
         wrong(format!("truncated: {} packed bytes, {} bytes left", length(0), rest.len()))
@@ -149,7 +149,8 @@ impl PcdHeader {
                 "DATA" => {
                     let area = width.zip(height.or(Some(1)));
                     let area = area.and_then(|(w, h): (usize, usize)| w.checked_mul(h));
-                    let rows = points.or(area).ok_or_else(|| head.wrong("no POINTS before"))?;
+                    let rows =
+                        points.or(area).ok_or_else(|| head.wrong("no POINTS before DATA"))?;
                     if area.is_some_and(|a| a != rows) {
                         let what = format!("{rows} POINTS are not WIDTH times HEIGHT");
                         return Err(head.wrong(what));
@@ -203,7 +204,7 @@ fn fields(
 ) -> Result<Vec<Field>, String> {
     let n = names.len();
     if n == 0 || sizes.len() != n || types.len() != n || counts.is_some_and(|c| c.len() != n) {
-        return Err("FIELDS, SIZE, TYPE and COUNT before do not have the same number".into());
+        return Err("FIELDS, SIZE, TYPE and COUNT do not have the same number of entries".into());
     }
     let field = |i: usize| {
         let number = match (types[i].as_str(), sizes[i]) {
@@ -212,12 +213,18 @@ fn fields(
             ("U", size @ (1 | 2 | 4 | 8)) => Number::Unsigned(size),
             ("I", size @ (1 | 2 | 4 | 8)) => Number::Signed(size),
             (kind, size) => {
-                return Err(format!("field `{}`: TYPE {kind} of SIZE {size}", names[i]));
+                return Err(format!(
+                    "field `{}`: TYPE {kind} of SIZE {size} is not supported",
+                    names[i]
+                ));
             }
         };
         let count = counts.map_or(1, |c| c[i]);
         if n > FIELDS_MAX || !(1..=FIELDS_MAX).contains(&count) {
-            return Err(format!("field `{}`: COUNT {count} in {n} fields", names[i]));
+            return Err(format!(
+                "field `{}`: COUNT {count} in {n} fields is out of range",
+                names[i]
+            ));
         }
         Ok(Field { name: names[i].clone(), number, count })
     };

@@ -28,7 +28,7 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
     }
     let first = track.poses.first().map_or(DVec3::ZERO, |pose| pose.translation);
     if !within(first, WORLD_MAX_M) {
-        return Err(format!("the first pose is at {:?} m", first.to_array()));
+        return Err(format!("the first pose is impossibly far away, at {:?} m", first.to_array()));
     }
     for (frame, pose) in frames.iter().zip(&track.poses) {
         reach(first, pose).map_err(|what| format!("the pose of frame {frame}: {what}"))?;
@@ -36,7 +36,7 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
     for (frame, &stamp_s) in frames.iter().zip(&track.stamps_s) {
         // Written this way because NaN is in no range.
         if !(-TIME_MAX_S..=TIME_MAX_S).contains(&stamp_s) {
-            return Err(format!("frame {frame} has a time of {stamp_s:e} s"));
+            return Err(format!("frame {frame} has an impossible time of {stamp_s:e} s"));
         }
     }
     // The stamps are finite by now.
@@ -54,7 +54,7 @@ pub(super) fn reach(first: DVec3, pose: &Pose) -> Result<(), String> {
     let away = pose.translation - first;
     match pose.rotation.is_finite() && within(away, REACH_MAX_M) {
         true => Ok(()),
-        false => Err(format!("{:.3e} m from the first pose", away.length())),
+        false => Err(format!("impossibly far, {:.3e} m from the first pose", away.length())),
     }
 }
 

@@ -79,9 +79,11 @@ impl PlyHeader {
                     let unknown = || head.wrong(format!("unknown type `{kind:.20}`"));
                     fields.push((name.to_owned(), number(kind).ok_or_else(unknown)?));
                 }
-                ["property", "list", ..] => return Err(head.wrong("a vertex with a list")),
+                ["property", "list", ..] => {
+                    return Err(head.wrong("a vertex with a list is not supported"));
+                }
                 ["end_header"] if element != Element::None => {
-                    let big = big.ok_or_else(|| head.wrong("no format before"))?;
+                    let big = big.ok_or_else(|| head.wrong("no format before end_header"))?;
                     return Ok(PlyHeader { fields, rows, big });
                 }
                 _ => {

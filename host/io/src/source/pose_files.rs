@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, stamps_ns: &[i64]) -> Result<Vec<Option<Pose>>, 
     }
     let fits = if timed { rows.len() == sweeps } else { (1..=sweeps).contains(&rows.len()) };
     if !fits {
-        let times = if timed { " of other times than the sweeps" } else { "" };
+        let times = if timed { " at other times than the sweeps" } else { "" };
         let what = format!("{} poses{times}, expected {sweeps}", rows.len());
         return Err(Error::input(path, "", what));
     }
@@ -118,7 +118,7 @@ fn row(path: &Path, place: String, numbers: &[f64]) -> Result<PoseRow, Error> {
             let pose = rigid([x, y, z], [a, b, c, d]).map_err(wrong)?;
             // Written this way because NaN is in no range.
             if !(-TIME_MAX_S..=TIME_MAX_S).contains(&time_s) {
-                return Err(wrong(&format!("a time of {time_s} s")));
+                return Err(wrong(&format!("an impossible time of {time_s} s")));
             }
             (Some(time_s), pose)
         }
@@ -169,15 +169,15 @@ mod tests {
             read(&t.write(name, text), stamps_ns).unwrap_err().to_string()
         };
         let what = refused("t.txt", &tum(77.0), &[0, S]);
-        assert!(what.ends_with("t.txt: 3 poses of other times than the sweeps, expected 2"));
+        assert!(what.ends_with("t.txt: 3 poses at other times than the sweeps, expected 2"));
         assert!(refused("k.txt", kitti, &[0]).ends_with("k.txt: 2 poses, expected 1"));
         assert!(refused("k.txt", "", &[0]).ends_with("0 poses, expected 1"));
         let mixed = format!("{kitti}{}", tum(0.0));
         assert!(refused("m.txt", &mixed, &[0]).contains("line 4: some rows have a time"));
         assert!(refused("m.txt", "1 2 3", &[0]).contains("line 1: 12 numbers (a 3x4 matrix) or 8"));
         let skew = tum(0.0).replace("0 0 0 1", "0 0 0 0.5");
-        assert!(refused("m.txt", &skew, &[0]).contains("has not the length 1"));
-        assert!(refused("m.txt", &tum(f64::NAN), &[0]).contains("a time of NaN s"));
+        assert!(refused("m.txt", &skew, &[0]).contains("does not have length 1"));
+        assert!(refused("m.txt", &tum(f64::NAN), &[0]).contains("time of NaN s"));
     }
 
     #[test]

@@ -59,7 +59,7 @@ pub(super) fn check_rising(
     for (i, pair) in stamps_s.windows(2).enumerate() {
         if pair[1] <= pair[0] {
             let how = if pair[1] == pair[0] { "equal to" } else { "before" };
-            let what = format!("time {} s is {how} the sweep before it ({} s)", pair[1], pair[0]);
+            let what = format!("time {} s is {how} the one before it ({} s)", pair[1], pair[0]);
             return Err(Error::input(path, place(i + 1), what));
         }
     }
@@ -76,7 +76,7 @@ pub fn rigid(place: [f64; 3], [x, y, z, w]: [f64; 4]) -> Result<Pose, &'static s
         return Err("a pose with a NaN or infinite number");
     }
     if (rotation.length() - 1.0).abs() > UNIT_TOLERANCE {
-        return Err("the quaternion of the pose has not the length 1");
+        return Err("the quaternion of the pose does not have length 1");
     }
     Ok(Pose::new(rotation, place))
 }

@@ -37,7 +37,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
         0 => {
             let marks: Vec<&str> = FORMATS.iter().flat_map(|row| row.marks).copied().collect();
             let what = format!("no recording found: none of `{}`", marks.join("`, `"));
-            Err(Error::input(path, "", what + " (a `.pcap` is named itself)"))
+            Err(Error::input(path, "", what + " (a `.pcap` must be named itself)"))
         }
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
@@ -58,7 +58,7 @@ fn format_of_file(path: &Path) -> Result<Format, Error> {
         Some("bag") => "a ROS 1 bag, convert it: mcap convert IN.bag OUT.mcap",
         Some("db3") => "a ROS 2 bag in SQLite, convert it to MCAP: ros2 bag convert",
         Some(e) if EXTENSIONS.contains(&e) => {
-            "a single cloud, expected the folder it is in; of two clouds: raywake flow A B"
+            "a single cloud, expected the folder it is in; for two clouds: raywake flow A B"
         }
         _ => "expected a folder, an .mcap or a .pcap file, found a file of another kind",
     };

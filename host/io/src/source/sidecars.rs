@@ -76,7 +76,7 @@ impl Sidecars {
         let (path, sensors) = self.read("sensor", cloud, points.len(), 1)?;
         for (n, (point, &sensor)) in points.iter_mut().zip(&sensors).enumerate() {
             if usize::from(sensor) >= self.rig.sensors.len() {
-                let what = format!("sensor {sensor} of {}", self.rig.sensors.len());
+                let what = format!("sensor {sensor} of {}, counted from 0", self.rig.sensors.len());
                 return Err(Error::input(&path, format!("return {n}"), what));
             }
             point.sensor = sensor.into();
@@ -112,7 +112,7 @@ fn read_rig(path: &Path) -> Result<(Rig, [f64; 2]), Error> {
         return Err(Error::input(path, "", "lines `span:` and `ground:` expected"));
     };
     if !(from_s.abs() <= SPAN_MAX_S && span_s > 0.0 && span_s <= SPAN_MAX_S) {
-        let what = format!("a sweep from {from_s} s over {span_s} s; at most {SPAN_MAX_S} s");
+        let what = format!("a sweep from {from_s} s lasting {span_s} s; at most {SPAN_MAX_S} s");
         return Err(Error::input(path, format!("line {span_line}"), what));
     }
     if !ground_m.is_finite() {

@@ -113,6 +113,8 @@ mod tests {
         t.write("1.pcd", "FIELDS x y z\nVIEWPOINT 0 0 0 2 0 0 0\nDATA ascii\n");
         let error =
             open(t.path(), &options(Unlocated::Accept)).map(|_| ()).unwrap_err().to_string();
-        assert!(error.ends_with("1.pcd, line 2: the quaternion of the pose has not the length 1"));
+        assert!(
+            error.ends_with("1.pcd, line 2: the quaternion of the pose does not have length 1")
+        );
     }
 }

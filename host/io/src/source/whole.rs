@@ -55,7 +55,7 @@ pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
         return Err(Error::reading(path)(io::ErrorKind::IsADirectory.into()));
     }
     if !metadata.is_file() {
-        return Err(Error::input(path, "", "is not an ordinary file, but a device or a pipe"));
+        return Err(Error::input(path, "", "is not a regular file, but a device or a pipe"));
     }
     Ok((File::open(path).map_err(Error::reading(path))?, metadata.len()))
 }

@@ -103,7 +103,7 @@ fn write(
     table: report::Table,
     out: &Path,
 ) -> Result<Results, Error> {
-    let mut report = Report::new("Ablations", "What every choice is worth");
+    let mut report = Report::new("Ablations", "What each choice is worth");
     report.fact("Base", &base.profile.name);
     report.fact("Weights", &base.weights_digest);
     report.fact("Backend", &format!("{:?}", base.backend.backend).to_lowercase());

@@ -31,10 +31,10 @@ const COLUMNS: [&str; 22] = [
     "Flow, ms",
     "Refine, track, out, ms",
     "Device, MB",
-    "Put out as moving: precision, %",
+    "Reported as moving: precision, %",
     "Recall, %",
     "Precision, 0.5 m forgiven, %",
-    "False a sweep, 2 m and more from movers",
+    "False per sweep, 2 m or more from movers",
 ];
 
 /// Stages of a pair that are shown as one figure.
@@ -99,18 +99,18 @@ fn part<'a>(facts: &'a Facts, names: &'a [&str]) -> impl Iterator<Item = f64> + 
 
 /// The table of all rows; `failures` states why variants have no figures.
 pub fn table(rows: Vec<TableRow>, failures: &[String]) -> Table {
-    let caption = "Variants of the base, one thing changed in each: error of the raw flow of \
-        labelled columns (labels as they are) and of the background, median error of the velocity \
-        of tracklets of age 10 and more (smoothed labels), columns with such a tracklet, median \
-        times of a pair of sweeps, bytes of the device's heaps; and what is put out as moving, as \
-        `eval` counts it.";
-    let note = "Times of one table are of one machine, one variant and one drive at a time, while \
-        another thread makes rows. Voxels are cubes: with smaller cells the levels of a column \
-        shrink too, though the learned numbers are for levels of 0.30 m; and columns and their \
-        truth are those of the variant's own grid, so that rows of one window are compared. The \
-        search has 15 cells either way, which is fixed at compile time: its metres are the cell's \
-        doing. So is the window of 3 x 3 columns that costs are summed over. In the sensor's frame \
-        nothing is refined below a cell: its row stands beside `refine-0`.";
+    let caption = "Variants of the base, one change in each: error of the raw flow of labelled \
+        columns (labels as given) and of the background, median error of the velocity of tracklets \
+        of age 10 or more (smoothed labels), columns with such a tracklet, median times of a pair \
+        of sweeps, bytes of the device's heaps; and what is reported as moving, counted as in \
+        `eval`.";
+    let note = "Times in one table are from one machine, one variant and one drive at a time, \
+        while another thread makes rows. Voxels are cubes: with smaller cells the levels of a \
+        column shrink too, though the learned parameters are for levels of 0.30 m; and columns and \
+        their truth are those of the variant's own grid, so compare rows of the same window. The \
+        search spans 15 cells either way, fixed at compile time: its reach in metres follows from \
+        the cell size. So does that of the window of 3 x 3 columns over which costs are summed. In \
+        the sensor's frame nothing is refined below a cell: compare its row with `refine-0`.";
     let mut table = Table::new("ablations", caption, &COLUMNS, rows).note(note);
     table.notes.extend_from_slice(failures);
     table

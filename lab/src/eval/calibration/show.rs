@@ -15,7 +15,7 @@ impl Quantity {
     fn label(self) -> &'static str {
         match self {
             Quantity::Flow => "flow",
-            Quantity::Settled => "tracklets of age 10 and more",
+            Quantity::Settled => "tracklets of age 10 or more",
             Quantity::Velocity => "velocity at any age",
         }
     }
@@ -28,7 +28,7 @@ impl Quantity {
 impl Columns {
     fn label(self) -> String {
         match self {
-            Columns::Displaced => "put out with a displacement".into(),
+            Columns::Displaced => "output with a displacement".into(),
             Columns::Of(group, MotionGroup::Any) => group.label().into(),
             Columns::Of(group, motion) => format!("{}, {}", group.label(), motion.label()),
         }
@@ -86,11 +86,11 @@ pub fn table(calibration: &Calibration) -> Table {
         "Median error",
     ];
     let caption = "Covariances beside errors: share of true values in the 68 % and the 95 % \
-        ellipse of the covariance put out (squared Mahalanobis distance up to 2.279 and 5.991).";
-    let note = "Columns with a covariance of zero, background and what has no match, have no \
-        ellipse; they are counted apart and not among the shares. The deviation is the root of \
-        half the trace, in the unit of the value; of an ellipse that is right and round the median \
-        error is 1.18 of it.";
+        ellipse of the output covariance (squared Mahalanobis distance up to 2.279 and 5.991).";
+    let note = "Columns with a covariance of zero, background and those without a match, have no \
+        ellipse; they are counted separately and excluded from the shares. The deviation is the \
+        root of half the trace, in the unit of the value; for a correct circular covariance the \
+        median error is 1.18 times it.";
     Table::new("calibration", caption, &columns, rows).note(note)
 }
 
@@ -106,7 +106,7 @@ pub fn reliability(calibration: &Calibration) -> Chart {
     for quantity in [Quantity::Flow, Quantity::Settled] {
         for exact in [true, false] {
             let mut lines = Lines::new(
-                Axis::new("probability claimed of an ellipse").range(0.0, 1.0),
+                Axis::new("claimed probability of the ellipse").range(0.0, 1.0),
                 Axis::new("share of true values in it").range(0.0, 1.0),
             );
             lines.series = [MotionGroup::Moving, MotionGroup::Parked]
@@ -120,7 +120,7 @@ pub fn reliability(calibration: &Calibration) -> Chart {
             parts.push((title, Plot::Lines(lines)));
         }
     }
-    let caption = "Reliability of the covariances of labelled columns: below the diagonal they \
-        claim too much, above it too little.";
+    let caption = "Reliability of the covariances of labelled columns: below the diagonal they are \
+        overconfident, above it too cautious.";
     Chart::small_multiples("figure-reliability", caption, parts)
 }

@@ -107,8 +107,8 @@ impl ColumnVerdicts {
             }
         }
         let columns =
-            ["Truth", "Class", "Motion", "Columns", "Put out as moving, %", "By flow alone, %"];
-        let caption = "Columns put out as moving, by what they are; by flow alone, by their \
+            ["Truth", "Class", "Motion", "Columns", "Reported as moving, %", "By flow alone, %"];
+        let caption = "Columns reported as moving, by what they are; by flow alone: by their \
             displacement, whatever the velocity.";
         Table::new("moving-by-class", caption, &columns, rows)
     }

@@ -28,17 +28,17 @@ const ASPECTS: [Aspect; 6] = [
     Aspect { name: "class", bins: &CLASSES, bin: |row| row.class as usize },
     Aspect {
         name: "range",
-        bins: &["to 10 m", "10 to 20 m", "20 to 30 m", "30 m and more"],
+        bins: &["to 10 m", "10 to 20 m", "20 to 30 m", "30 m or more"],
         bin: |row| bin(&RANGES_M, row.x.hypot(row.y)),
     },
     Aspect {
         name: "age of the tracklet",
-        bins: &["0", "1 to 2", "3 to 5", "6 to 9", "10 and more"],
+        bins: &["0", "1 to 2", "3 to 5", "6 to 9", "10 or more"],
         bin: |row| bin(&AGES, row.age),
     },
     Aspect {
         name: "occupied voxels",
-        bins: &["to 1", "2", "3 to 4", "5 and more"],
+        bins: &["to 1", "2", "3 to 4", "5 or more"],
         bin: |row| bin(&VOXELS, row.voxels),
     },
     Aspect {
@@ -86,10 +86,10 @@ impl FalseMotion {
                 }));
             }
         }
-        let head = ["Truth", "By", "Of", "Standing columns", "Put out as moving, %"];
-        let columns = [&head[..], &["False a sweep"], &ZONES[..]].concat();
-        let caption = "False motion: columns that stand, what is put out as moving of them, and \
-            how many of those a sweep has by their distance from the nearest mover's box.";
+        let head = ["Truth", "By", "Of", "Static columns", "Reported as moving, %"];
+        let columns = [&head[..], &["False per sweep"], &ZONES[..]].concat();
+        let caption = "False motion: static columns, the share of them reported as moving, and how \
+            many of those there are per sweep by their distance from the nearest mover's box.";
         Table::new("false-motion", caption, &columns, rows)
     }
 }

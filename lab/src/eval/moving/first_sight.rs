@@ -75,14 +75,14 @@ impl FirstSights {
             "Never",
             "Median, s",
             "90 %, s",
-            "Half of it: never",
-            "Half of it: median, s",
-            "Half of it: 90 %, s",
+            "Half: never",
+            "Half: median, s",
+            "Half: 90 %, s",
         ];
         let caption = "Time from the first sight of a mover, a solid column in view while it \
-            moves, until it is put out as moving: one of its columns, or half of them.";
-        let note = "A pair of sweeps is put out with the second: one period is the least. What is \
-            never put out so counts as infinitely late.";
+            moves, until it is reported as moving: one of its columns, or half of them.";
+        let note = "A pair of sweeps is output with the second: the minimum is one period. A mover \
+            that is never reported counts as infinitely late.";
         Table::new("first-sight", caption, &columns, rows).note(note)
     }
 }

@@ -120,7 +120,7 @@ const COLUMNS: [&str; 12] = [
     "Recall, %",
     "IoU, %",
     "Precision, 0.5 m forgiven, %",
-    "False a sweep within 0.5 m of a mover",
+    "False per sweep within 0.5 m of a mover",
     "0.5 to 2 m",
     "Farther",
 ];
@@ -146,15 +146,15 @@ pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
         }
     }
     let caption = format!(
-        "Moving against standing: solid columns and returns, true where they belong to an object \
-         of {MOVING_MPS} m/s or more and are put out as moving, with a displacement and a velocity \
-         of as much."
+        "Moving against static: solid columns and returns, true if they belong to an object of \
+         {MOVING_MPS} m/s or more and are reported as moving, with a displacement and a velocity \
+         of at least that."
     );
-    let note = "Parked objects and whatever no label holds stand; slow objects do not count. IoU \
-        is that of SemanticKITTI's moving object segmentation, over all returns in view. False \
-        motion is told apart by its distance from the nearest box of a mover, seen from above. The \
-        road below objects, which exact truth tells apart and boxes do not, counts in a row of its \
-        own.";
+    let note = "Parked objects and whatever is unlabelled are static; slow objects do not count. \
+        IoU is that of SemanticKITTI's moving object segmentation, over all returns in view. False \
+        motion is divided by its distance from the nearest box of a mover, seen from above. The \
+        road below objects, which exact truth distinguishes and boxes do not, counts in a row of \
+        its own.";
     Table::new("moving-or-not", caption, &COLUMNS, rows).note(note)
 }
 

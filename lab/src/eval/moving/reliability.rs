@@ -75,9 +75,9 @@ impl MovesReliability {
                 ]));
             }
         }
-        let caption = "Columns in view with a P(moves) of so much or more, whatever their \
-            velocity, and how many of those move; `--moving` chooses. The Brier score is the mean \
-            squared difference between P(moves) and what is true, over all columns.";
+        let caption = "Columns in view with at least this P(moves), whatever their velocity, and \
+            how many of those move; `--moving` selects the threshold. The Brier score is the mean \
+            squared difference between P(moves) and the truth, over all columns.";
         let columns = ["Truth", "P(moves)", "Columns", "Precision, %", "Recall, %", "Brier score"];
         Table::new("p-moves", caption, &columns, rows)
     }
@@ -104,8 +104,8 @@ impl MovesReliability {
             (format!("truth: {}", truth(exact)), Plot::Lines(lines))
         };
         let there = [true, false].into_iter().filter(|e| self.0[usize::from(*e)].sums(0).0 > 0);
-        let caption = "Reliability of P(moves): below the diagonal it claims too much, above it \
-            too little.";
+        let caption = "Reliability of P(moves): below the diagonal it is overconfident, above it \
+            too cautious.";
         Chart::small_multiples("figure-p-moves", caption, there.map(part).collect())
     }
 }

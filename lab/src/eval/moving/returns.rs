@@ -123,8 +123,8 @@ impl ClassSums {
     fn note(&self) -> String {
         let [[_, wrong], [moving, found]] = self.of_motion;
         if moving == 0 {
-            return "Whether vehicles and people move is not labelled: they count neither as \
-                standing nor as moving."
+            return "Whether vehicles and people move is not labelled: they count neither as static \
+                nor as moving."
                 .into();
         }
         let iou = 100.0 * share(found, moving + wrong);
@@ -156,10 +156,10 @@ pub fn semantic_kitti<'a>(drives: impl Iterator<Item = &'a ReturnCounts>) -> Opt
     };
     let name = |class: u16| label(class).name().map_or(format!("class {class}"), String::from);
     let classes = sums.classes.iter().map(|(&class, &counts)| row(&name(class), counts));
-    let motions = ["all that stands", "all that moves"].into_iter().zip(sums.of_motion);
+    let motions = ["all static", "all moving"].into_iter().zip(sums.of_motion);
     let motions = motions.filter(|(_, counts)| counts[0] > 0).map(|(name, c)| row(name, c));
-    let caption = "Returns put out as moving, by SemanticKITTI's classes.";
-    let columns = ["Class", "Returns", "Put out as moving", "Put out as moving, %"];
+    let caption = "Returns reported as moving, by SemanticKITTI's classes.";
+    let columns = ["Class", "Returns", "Reported as moving", "Reported as moving, %"];
     let rows = classes.chain(motions).collect();
     Some(Table::new("semantic-kitti", caption, &columns, rows).note(&sums.note()))
 }

@@ -21,8 +21,7 @@ fn movers_are_found_and_little_else() {
     let out = evaluated(&scratch, "kitti_raw_0005", &["-n", "40", "--pairs"]);
     let verdict = |of: &str, column: &str| figure(&out, "moving-or-not", &[of, "labels"], column);
     let flow = |column: &str| figure(&out, "table-3-1", &["All labelled", "moving"], column);
-    let late =
-        |class: &str| figure(&out, "first-sight", &["labels", class], "Half of it: median, s");
+    let late = |class: &str| figure(&out, "first-sight", &["labels", class], "Half: median, s");
     let mut wrong = Vec::new();
     for (what, value, least, most) in [
         ("precision of columns", verdict("columns", "Precision, %"), 76.0, 100.0),
@@ -49,9 +48,9 @@ fn movers_are_found_and_little_else() {
 fn what_stands_is_put_out_so() {
     let scratch = Scratch::new();
     let out = evaluated(&scratch, "kitti_odometry_00", &["--deskew", "off"]);
-    let share = |class: &str| figure(&out, "semantic-kitti", &[class], "Put out as moving, %");
+    let share = |class: &str| figure(&out, "semantic-kitti", &[class], "Reported as moving, %");
     for (class, most) in [
-        ("all that stands", 0.008),
+        ("all static", 0.008),
         ("building", 0.01),
         ("vegetation", 0.015),
         ("fence", 0.01),

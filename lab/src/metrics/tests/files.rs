@@ -177,12 +177,12 @@ fn by_name_or_by_order() {
     t.feather("count/log/0000000001.feather", flow(&[0.0; 3], &[true; 3]));
     assert_eq!(t.grade("count"), "");
     t.feather("count/log/0000000002.feather", flow(&[0.0; 3], &[true; 3]));
-    assert!(t.grade("count").contains("0000000002.feather: is flow from sweep 2 on"));
+    assert!(t.grade("count").contains("0000000002.feather: holds flow from sweep 2"));
     t.feather("count/log/1000000000.feather", flow(&[0.0; 3], &[true; 3]));
     assert!(t.grade("count").contains("some names are stamps"));
     t.feather("twice/log/1.feather", flow(&[0.0; 3], &[true; 3]));
     t.feather("twice/log/01.feather", flow(&[0.0; 3], &[true; 3]));
-    assert!(t.grade("twice").contains("two names are the same number"));
+    assert!(t.grade("twice").contains("two names denote the same number"));
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn wrong_truth() {
     };
     assert!(pair(truth(&[0.0; 4], &[0; 4])).contains("4 rows, but the sweep has 3 returns"));
     let text = pair(truth(&[0.0; 3], &[0, 30, 0]));
-    assert!(text.contains("1000000000.feather, row 1: classes_0 30 is none of"), "{text}");
+    assert!(text.contains("1000000000.feather, row 1: classes_0 30 is not in"), "{text}");
     assert!(pair(flow(&[0.0; 3], &[true; 3])).contains("has no column `classes_0`"));
     // NaN that counts is reported with the truth's file, whatever is graded.
     t.feather(TRUTH, truth(&[f32::NAN, 0.0, 0.0], &[18, -1, -1]));
@@ -259,9 +259,9 @@ fn wrong_maps() {
     fs::remove_file(t.0.path().join(sim)).unwrap();
     assert!(refused().contains("map: lacks a Sim2"));
     t.write("val/log/map/log_ground_height_surface____X.npy", "PK");
-    assert!(refused().contains("X.npy: is no NumPy file"));
+    assert!(refused().contains("X.npy: is not a NumPy file"));
     t.write("val/log/map/log_ground_height_surface____Y.npy", "");
-    assert!(refused().contains("map: holds 2 files that could be a raster of heights"));
+    assert!(refused().contains("map: holds 2 files that could be a height raster"));
     fs::remove_dir_all(t.0.path().join("val/log/map")).unwrap();
     assert!(refused().contains("cannot read"));
     let elsewhere = Log::open(Path::new("/nowhere"), None, true);

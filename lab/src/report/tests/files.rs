@@ -203,11 +203,11 @@ fn what_does_not_fit_is_refused_by_name() {
     let twice = refused(&|s| {
         s.chart(example::stages()).chart(example::stages());
     });
-    assert!(twice.contains("\"stages\" is there twice"), "{twice}");
+    assert!(twice.contains("\"stages\" is used twice"), "{twice}");
     let path = refused(&|s| {
         s.table(Table { id: "../x".into(), ..example::table() });
     });
-    assert!(path.contains("\"../x\" is no plain name"), "{path}");
+    assert!(path.contains("\"../x\" is not a plain name"), "{path}");
     let ragged = refused(&|s| {
         let mut table = example::table();
         table.rows.push(TableRow::new([Cell::Empty]));
@@ -218,7 +218,7 @@ fn what_does_not_fit_is_refused_by_name() {
     let picture = refused(&|s| {
         s.picture(Picture { id: "p".into(), caption: caption.clone(), png: b"GIF89a".to_vec() });
     });
-    assert!(picture.contains("picture p: is no PNG file"), "{picture}");
+    assert!(picture.contains("picture p: is not a PNG file"), "{picture}");
 }
 
 #[test]

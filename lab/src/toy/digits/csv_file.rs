@@ -18,13 +18,17 @@ pub fn read(path: &Path) -> Result<Digits, Error> {
         let number = |text: &str| text.trim().parse::<f32>().ok();
         let numbers: Option<Vec<f32>> = line.iter().map(number).collect();
         let Some((label, pixels)) = numbers.as_deref().and_then(<[f32]>::split_last) else {
-            return Err(Error::input(path, place(), "is not all numbers"));
+            return Err(Error::input(path, place(), "contains something other than numbers"));
         };
         if !(0..CLASSES).any(|digit| digit as f32 == *label) {
-            return Err(Error::input(path, place(), format!("ends in {label}, which is no digit")));
+            return Err(Error::input(
+                path,
+                place(),
+                format!("ends in {label}, which is not a digit"),
+            ));
         }
         if pixels.is_empty() || pixels.iter().any(|p| !(0.0..=TOP).contains(p)) {
-            return Err(Error::input(path, place(), format!("a pixel beyond 0 to {TOP}")));
+            return Err(Error::input(path, place(), format!("a pixel outside 0 to {TOP}")));
         }
         digits.pixels = pixels.len();
         digits.values.extend(pixels.iter().map(|p| p / TOP));

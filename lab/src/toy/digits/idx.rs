@@ -27,7 +27,7 @@ pub fn read(folder: &Path, seed: u64) -> Result<DigitSets, Error> {
         }
         (Some(one), None) | (None, Some(one)) => Ok(divided(one, folder, seed)),
         (None, None) => {
-            let what = "no digits: neither t10k-images-idx3-ubyte, packed or not, nor 0.json";
+            let what = "no digits: neither t10k-images-idx3-ubyte (gzipped or not) nor 0.json";
             Err(Error::input(folder, "", what))
         }
     }
@@ -67,7 +67,7 @@ fn contents<const N: usize>(path: &Path, magic: u32) -> Result<([usize; N], Vec<
     let error = |what: String| Error::input(path, "", what);
     let head = 4 + 4 * N;
     if bytes.len() < head {
-        return Err(error(format!("{} bytes, cut within its head", bytes.len())));
+        return Err(error(format!("{} bytes, cut off within its header", bytes.len())));
     }
     let word = |n: usize| u32::from_be_bytes(std::array::from_fn(|i| bytes[4 * n + i]));
     if word(0) != magic {

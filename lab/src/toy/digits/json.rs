@@ -22,11 +22,11 @@ pub fn read(folder: &Path) -> Result<Digits, Error> {
         let Pictures { data } = serde_json::from_slice(&bytes(&path)?)
             .map_err(|e| Error::input(&path, format!("line {}", e.line()), e.to_string()))?;
         if !data.len().is_multiple_of(PIXELS) {
-            let what = format!("{} numbers are no whole pictures of {PIXELS}", data.len());
+            let what = format!("{} numbers are not a multiple of {PIXELS}", data.len());
             return Err(Error::input(&path, "", what));
         }
         if let Some(v) = data.iter().find(|v| !(0.0..=1.0).contains(*v)) {
-            return Err(Error::input(&path, "", format!("a brightness of {v}, not of 0 to 1")));
+            return Err(Error::input(&path, "", format!("a brightness of {v}, outside 0 to 1")));
         }
         digits.labels.extend(std::iter::repeat_n(digit as u8, data.len() / PIXELS));
         digits.values.extend(data);

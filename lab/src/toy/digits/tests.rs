@@ -55,7 +55,7 @@ fn what_is_wrong_is_named() {
     let cases: [(&str, Vec<u8>, Vec<u8>); 6] = [
         ("99 labels", images.clone(), files(99)[1].clone()),
         ("bytes for counts", images[..300].to_vec(), labels.clone()),
-        ("cut within its head", images[..9].to_vec(), labels.clone()),
+        ("cut off within its header", images[..9].to_vec(), labels.clone()),
         ("begins with 0x803", images.clone(), images.clone()),
         ("bytes for counts", idx(0x803, &[u32::MAX; 3], &[]), labels.clone()),
         ("is 10", images.clone(), idx(0x801, &[100], &[10; 100])),
@@ -87,7 +87,7 @@ fn numbers_in_lines() {
     assert_eq!((sets.training.count(), sets.test.count(), sets.test.pixels), (160, 40, 4));
     assert_eq!(sets.test.picture(0)[2..], [1.0, 0.5]);
     for (line, told) in [
-        ("0,1,2,3,10\n", "no digit"),
+        ("0,1,2,3,10\n", "not a digit"),
         ("0,1,2,17,1\n", "pixel"),
         ("0,1,x,3,1\n", "numbers"),
         ("0,1,2,1\n", "line: 201"),
@@ -108,7 +108,7 @@ fn a_file_for_each_digit() {
     }
     let sets = open(scratch.path(), 3).unwrap();
     assert_eq!((sets.training.count(), sets.test.count()), (116, 29));
-    for (text, told) in [("{\"data\": [0, 1]}", "whole pictures"), ("{", "line 1")] {
+    for (text, told) in [("{\"data\": [0, 1]}", "not a multiple"), ("{", "line 1")] {
         scratch.write("3.json", text);
         let error = open(scratch.path(), 3).unwrap_err().to_string();
         assert!(error.contains("3.json") && error.contains(told), "{error}");

@@ -84,9 +84,9 @@ impl Contents {
         }
         for (topic, CloudTopic { empty, late, foreign, .. }) in &contents.topics {
             let notes = [
-                (*empty, "messages without a point"),
-                (*late, "messages that are not later than those before them"),
-                (*foreign, "messages in another frame than the first"),
+                (*empty, "messages without points"),
+                (*late, "messages that are not later than the one before"),
+                (*foreign, "messages in a different frame than the first"),
             ];
             let notes = notes.into_iter().filter(|(count, _)| *count > 0);
             contents.notes.extend(notes.map(|(n, what)| format!("{topic}: skipped {n} {what}")));

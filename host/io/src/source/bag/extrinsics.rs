@@ -44,7 +44,9 @@ pub(super) fn add(path: &Path, contents: &mut Contents) -> Result<(), Error> {
                 |(name, topic): (&String, &CloudTopic)| format!("`{}` of {name}", topic.frame);
             let frames: Vec<String> = contents.topics.iter().map(frame).collect();
             let there = frames.join(", ");
-            return Err(wrong(&format!("nothing is in `{child}`; clouds are in {there}")));
+            return Err(wrong(&format!(
+                "no clouds or poses in frame `{child}`; clouds are in {there}"
+            )));
         }
         contents.fixed.add(Transform { stamp_ns: 0, parent, child, parent_from_child });
     }
@@ -82,7 +84,7 @@ mod tests {
         let mut whole = open(&whole, &accept()).unwrap();
         let (path, by_frame) = told(&temp, BY_FRAME);
         let e = open(&path, &accept()).err().unwrap().to_string();
-        assert!(e.contains("several topics of clouds"), "{e}");
+        assert!(e.contains("several topics have clouds"), "{e}");
         let mut source = open(&path, &by_frame).unwrap();
         assert_eq!(points(source.as_mut()), points(whole.as_mut()));
         assert!(source.is_located() && source.rig().sensors == whole.rig().sensors);
@@ -102,7 +104,7 @@ mod tests {
             ("base_link lidar 1 2 3 0 0 0 2", "line 1: the quaternion of the pose"),
             (
                 "base_link mast 1 2 3 0 0 0 1",
-                "nothing is in `mast`; clouds are in `lidar` of /points",
+                "no clouds or poses in frame `mast`; clouds are in `lidar` of /points",
             ),
         ] {
             let (path, options) = told(&temp, links);
@@ -112,6 +114,6 @@ mod tests {
         let drive = OpenOptions { extrinsics: Some("x".into()), ..OpenOptions::default() };
         temp.write("d/velodyne_points/data/0.bin", []);
         let e = open(&temp.path().join("d"), &drive).err().unwrap().to_string();
-        assert!(e.contains("--extrinsics is for recordings in MCAP"), "{e}");
+        assert!(e.contains("--extrinsics applies only to MCAP recordings"), "{e}");
     }
 }

@@ -155,7 +155,7 @@ fn livox(header: CloudHeader, mut wire: Wire, points: &mut Vec<Point>) -> Result
     (0..4).try_for_each(|_| wire.byte().map(|_| ()))?;
     let count = wire.word()? as usize;
     if count != header.size[1] as usize {
-        return Err(format!("{count} points, said to be {}", header.size[1]));
+        return Err(format!("{count} points, but the header says {}", header.size[1]));
     }
     let (data, step) = wire.records(count, LIVOX_POINT)?;
     let named = LIVOX.map(|(name, number)| (name.to_owned(), number));
@@ -187,7 +187,7 @@ fn point_cloud(
     let wanted = before.and_then(|before| before.checked_add(width * step));
     if row_step < width * step || wanted.is_none_or(|wanted| wanted > data.len()) {
         let (has, of) = (data.len(), format!("{height} x {width} points of {step} bytes"));
-        return Err(format!("{has} bytes with rows of {row_step} are too few for {of}"));
+        return Err(format!("{has} bytes in rows of {row_step} are too few for {of}"));
     }
     let fields = Fields::find(&named)?.stamped(stamp_ns);
     let value = |point: usize, field: usize| {
@@ -211,7 +211,8 @@ fn fields(wire: &mut Wire) -> Result<NamedFields, String> {
         let (name, start, kind) = (wire.text()?, wire.word()? as usize, wire.byte()?);
         // Its count of numbers: only the first is used.
         wire.word()?;
-        let number = number(kind).ok_or_else(|| format!("field `{name}` has type {kind}"))?;
+        let number =
+            number(kind).ok_or_else(|| format!("field `{name}` has unknown type {kind}"))?;
         named.push((name.to_owned(), number));
         starts.push(start);
     }

@@ -114,7 +114,7 @@ impl Bag {
         }
         if let Some(path) = &options.poses {
             if options.poses_frame == Some(PosesFrame::Camera) {
-                return Err(Error::Usage("an MCAP file has no camera's frame".into()));
+                return Err(Error::Usage("an MCAP file has no camera frame".into()));
             }
             let poses = pose_files::read(path, &self.stamps_ns())?;
             self.take_poses(&folder_name(path), poses);
@@ -127,11 +127,11 @@ impl Bag {
             return Ok(());
         }
         let found = match names.len() {
-            0 => format!("nothing tells where `{base}` was"),
-            n => format!("{n} sources tell where `{base}` was ({})", names.join(", ")),
+            0 => format!("nothing gives the pose of `{base}`"),
+            n => format!("{n} sources give the pose of `{base}` ({})", names.join(", ")),
         };
         options.go_without_poses(&self.root, &found)?;
-        self.overview.notes.push(format!("{found}: registration does"));
+        self.overview.notes.push(format!("{found}: using registration"));
         Ok(())
     }
 
@@ -244,11 +244,11 @@ fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<Stri
         let others: Vec<&str> = contents.others.iter().take(8).map(String::as_str).collect();
         let others = if others.is_empty() { "nothing".into() } else { others.join(", ") };
         return wrong(format!(
-            "no clouds (sensor_msgs/PointCloud2, livox CustomMsg); there are: {others}"
+            "no clouds (sensor_msgs/PointCloud2, livox CustomMsg); available: {others}"
         ));
     }
     if let Some(missing) = asked.iter().find(|name| !contents.topics.contains_key(*name)) {
-        return wrong(format!("no clouds on {missing}; there are: {listed}"));
+        return wrong(format!("no clouds on {missing}; available: {listed}"));
     }
     if asked.len() > SENSORS_MAX {
         return wrong(format!("{} topics, at most {SENSORS_MAX}", asked.len()));
@@ -262,7 +262,7 @@ fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<Stri
     let names: Vec<String> = contents.topics.keys().cloned().collect();
     match names.len() == 1 || is_rig(contents) {
         true => Ok(names),
-        false => wrong(format!("several topics of clouds, choose with --topic: {listed}")),
+        false => wrong(format!("several topics have clouds, choose with --topic: {listed}")),
     }
 }
 
@@ -293,12 +293,12 @@ fn lidars(
     for name in topics {
         let topic = &contents.topics[name];
         let (own, vehicle_from_lidar) = contents.fixed.base(&topic.frame).ok_or_else(|| {
-            let what = format!("/tf_static leads in a circle from `{}`", topic.frame);
+            let what = format!("the links of /tf_static form a circle from `{}`", topic.frame);
             Error::input(root, "", what)
         })?;
         if let Some(base) = base.as_ref().filter(|base| **base != own) {
             let what = format!(
-                "{name} and {} do not hang together: /tf_static fixes them to `{own}` and `{base}`",
+                "{name} and {} are not connected: /tf_static fixes them to `{own}` and `{base}`",
                 topics[0]
             );
             return Err(Error::input(root, "", what));

@@ -83,7 +83,7 @@ impl<'a> Wire<'a> {
         let step = size.next_multiple_of(alignment);
         let before = count.saturating_sub(1).checked_mul(step);
         let all = before.and_then(|before| before.checked_add(if count > 0 { size } else { 0 }));
-        Ok((self.take(all.ok_or("more records than there can be")?)?, step))
+        Ok((self.take(all.ok_or("an impossible number of records")?)?, step))
     }
 
     /// A string.

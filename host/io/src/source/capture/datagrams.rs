@@ -132,7 +132,7 @@ impl Datagrams {
         let wrong =
             |place: u64, what: String| Error::input(&self.path, format!("byte {place}"), what);
         let mut reader = create_reader(BUFFER, Cursor::new(before).chain(file))
-            .map_err(|_| wrong(0, "no pcap or pcapng file begins so".into()))?;
+            .map_err(|_| wrong(0, "not a pcap or pcapng file".into()))?;
         // Meaningless for blocks of the preamble.
         let mut place = from.wrapping_sub(before.len() as u64);
         loop {
@@ -158,7 +158,7 @@ impl Datagrams {
 /// Describes what is wrong with a file.
 fn damage(error: &PcapError<&[u8]>) -> String {
     match error {
-        PcapError::BufferTooSmall => format!("a frame of more than {BUFFER} bytes"),
+        PcapError::BufferTooSmall => format!("a frame longer than {BUFFER} bytes"),
         PcapError::ReadError => "cannot be read".into(),
         _ => "damaged: no frame begins here".into(),
     }
@@ -192,7 +192,7 @@ impl Frames {
                 self.interfaces = vec![Interface { link: header.network, resolution }];
             }
             PcapBlockOwned::NG(Block::SectionHeader(_)) if !self.interfaces.is_empty() => {
-                return Err("a second section: split the file".into());
+                return Err("a second section, which is not supported: split the file".into());
             }
             PcapBlockOwned::NG(Block::InterfaceDescription(interface)) => {
                 let resolution = interface.ts_resolution().unwrap_or(US_OF_S);
@@ -218,7 +218,8 @@ impl Frames {
 
     fn interface(&self, number: u32) -> Result<Interface, String> {
         let found = self.interfaces.get(number as usize).copied();
-        found.ok_or_else(|| format!("a frame of interface {number}, which the file does not have"))
+        found
+            .ok_or_else(|| format!("a frame of interface {number}, which the file does not define"))
     }
 
     fn frame<'a>(

@@ -93,15 +93,15 @@ impl Hdl64 {
         let mut lasers = [None; LASERS];
         for node in document.descendants().filter(|node| node.has_tag_name("px")) {
             let id: usize = number(node, "id_")?;
-            let place = lasers.get_mut(id).ok_or(format!("a laser of id_ {id}"))?;
-            let laser = laser(node).map_err(|what| format!("laser of id_ {id}: {what}"))?;
+            let place = lasers.get_mut(id).ok_or(format!("laser id_ {id} is out of range"))?;
+            let laser = laser(node).map_err(|what| format!("laser with id_ {id}: {what}"))?;
             if place.replace(laser).is_some() {
-                return Err(format!("two lasers of id_ {id}"));
+                return Err(format!("two lasers have id_ {id}"));
             }
         }
         let missing = lasers.iter().position(Option::is_none);
         missing.map_or(Ok(()), |id| {
-            Err(format!("of {LASERS} lasers the one of id_ {id} is missing"))
+            Err(format!("of {LASERS} lasers the one with id_ {id} is missing"))
         })?;
         Ok(Hdl64 { lasers: lasers.map(Option::unwrap_or_default), unit_m })
     }
@@ -160,12 +160,12 @@ fn since_first_ns(packet: &[u8], firing: usize) -> u64 {
 }
 
 fn child<'a>(of: Node<'a, 'a>, name: &str) -> Result<Node<'a, 'a>, String> {
-    of.children().find(|node| node.has_tag_name(name)).ok_or(format!("no {name}"))
+    of.children().find(|node| node.has_tag_name(name)).ok_or(format!("no element {name}"))
 }
 
 fn number<T: FromStr>(of: Node, name: &str) -> Result<T, String> {
     let text = child(of, name)?.text().unwrap_or_default().trim();
-    text.parse().map_err(|_| format!("{name}: `{text}` is no such number"))
+    text.parse().map_err(|_| format!("{name}: `{text}` is not a valid number"))
 }
 
 fn unit_m(of: Node) -> Result<f64, String> {
@@ -175,7 +175,7 @@ fn unit_m(of: Node) -> Result<f64, String> {
         Err(_) => UNIT_M,
     };
     let believed = UNITS_M.contains(&unit_m);
-    believed.then_some(unit_m).ok_or(format!("distLSB_: a unit of {unit_m} m"))
+    believed.then_some(unit_m).ok_or(format!("distLSB_: a unit of {unit_m} m is out of range"))
 }
 
 fn laser(of: Node) -> Result<CalibratedLaser, String> {

@@ -45,8 +45,8 @@ impl LiveSensor {
                 return Ok(LiveSensor(Sensor::Ouster(Arc::new(Ouster::read(path)?))));
             }
             (SensorModel::Ouster, None) => {
-                let what = "an Ouster's packets need --metadata, the JSON that the sensor gives of \
-                            itself (http://SENSOR/api/v1/sensor/metadata)";
+                let what = "an Ouster's packets need --metadata, the sensor's own JSON \
+                            (http://SENSOR/api/v1/sensor/metadata)";
                 return Err(Error::Usage(what.into()));
             }
             (SensorModel::Hdl64e, Some(path)) => {
@@ -57,7 +57,7 @@ impl LiveSensor {
                 return Err(Error::Usage(what.into()));
             }
             (_, Some(_)) => {
-                let what = "--metadata is for Ouster's sensors and the HDL-64E";
+                let what = "--metadata applies only to Ouster sensors and the HDL-64E";
                 return Err(Error::Usage(what.into()));
             }
             (SensorModel::Vlp16, _) => velodyne::VLP_16,

@@ -93,7 +93,7 @@ impl Capture {
         let set = set.map(|step| *step = usual.clamp(1, STEP_MAX_NS)).count();
         if set > 0 {
             let note =
-                format!("the sensor's clock was set, one turn is assumed there: {set} times");
+                format!("the sensor's clock was set, one revolution is assumed there: {set} times");
             self.overview.notes.push(note);
         }
         let usual = usual as f64;
@@ -114,9 +114,9 @@ impl Capture {
     fn locate(&mut self, options: &OpenOptions) -> Result<(), Error> {
         match &options.poses {
             _ if options.unlocated == Unlocated::Always => Ok(()),
-            None => options.go_without_poses(&self.path, "packets of a sensor"),
+            None => options.go_without_poses(&self.path, "sensor packets only"),
             Some(_) if options.poses_frame == Some(PosesFrame::Camera) => {
-                Err(Error::Usage("a capture has no camera's frame".into()))
+                Err(Error::Usage("a capture has no camera frame".into()))
             }
             Some(path) => {
                 let Overview { frames, track, epoch_ns, notes, .. } = &mut self.overview;

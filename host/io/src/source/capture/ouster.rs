@@ -268,7 +268,7 @@ impl Metadata<'_> {
     fn count(&self, key: &str) -> Result<Option<usize>, String> {
         let Some(value) = self.find(key) else { return Ok(None) };
         let count = value.as_u64().and_then(|n| usize::try_from(n).ok());
-        count.map(Some).ok_or_else(|| format!("`{key}` is no count"))
+        count.map(Some).ok_or_else(|| format!("`{key}` is not a count"))
     }
 
     fn numbers(&self, key: &str) -> Result<Vec<f64>, String> {
@@ -285,7 +285,7 @@ impl Metadata<'_> {
         let of_turn = self.count("columns_per_frame")?.or(mode).unwrap_or(0);
         let of_packet = self.count("columns_per_packet")?.unwrap_or(16);
         if !COLUMNS.contains(&of_turn) || !PACKET_COLUMNS.contains(&of_packet) {
-            return Err(format!("{of_turn} columns a turn, {of_packet} a packet"));
+            return Err(format!("{of_turn} columns per revolution, {of_packet} per packet"));
         }
         Ok([of_turn, of_packet])
     }
@@ -302,7 +302,7 @@ impl Metadata<'_> {
         let named = self.text("udp_profile_lidar").unwrap_or("LEGACY");
         PROFILES.iter().find(|p| p.name == named).ok_or_else(|| {
             let known: Vec<_> = PROFILES.iter().map(|p| p.name).collect();
-            format!("packets of profile `{named}`; known are {}", known.join(", "))
+            format!("unknown packet profile `{named}`; known: {}", known.join(", "))
         })
     }
 
@@ -312,7 +312,7 @@ impl Metadata<'_> {
             let matrix = self.numbers("beam_to_lidar_transform")?;
             return match matrix[..] {
                 [_, _, _, x, _, _, _, _, _, _, _, z, ..] => Ok([x, z].map(|mm| mm * M_OF_MM)),
-                _ => Err("`beam_to_lidar_transform` is no 4x4 matrix".into()),
+                _ => Err("`beam_to_lidar_transform` is not a 4x4 matrix".into()),
             };
         }
         let outwards = self.find("lidar_origin_to_beam_origin_mm").and_then(Value::as_f64);
@@ -321,7 +321,7 @@ impl Metadata<'_> {
 
     fn sensor_from_lidar(&self) -> Result<Pose, String> {
         let m = self.numbers("lidar_to_sensor_transform")?;
-        let rigid = "`lidar_to_sensor_transform` is no rigid motion";
+        let rigid = "`lidar_to_sensor_transform` is not a rigid transform";
         let [a, b, c, x, d, e, f, y, g, h, i, z, ..] = m[..] else { return Err(rigid.into()) };
         let rows = [a, b, c, x, d, e, f, y, g, h, i, z];
         let pose = Pose::from_rows(&rows).map_err(|_| rigid)?;

@@ -98,11 +98,11 @@ impl Stream {
         let first = usize::from(cuts[..last].first().filter(part).is_some());
         if sweeps > last - first {
             let left_out = sweeps + first - last;
-            notes.push(format!("left out: incomplete turns at the ends ({left_out})"));
+            notes.push(format!("left out: incomplete revolutions at the ends ({left_out})"));
         }
         let few = cuts[first..last].iter().filter(part).count();
         if few > 0 {
-            notes.push(format!("sweeps that lack more than a tenth of their packets: {few}"));
+            notes.push(format!("sweeps missing more than a tenth of their packets: {few}"));
         }
         cuts[first..=last].windows(2).map(|pair| [pair[0], pair[1]]).collect()
     }
@@ -144,9 +144,9 @@ impl Streams {
     fn none(&self, path: &Path) -> Error {
         let Streams { told, seen, largest, .. } = self;
         let others = match told.first() {
-            Some(told) => format!("nor of the {} that a file beside it tells of", told.name()),
-            None => "and Ouster's need the sensor's metadata, NAME.json beside NAME.pcap, an \
-                     HDL-64E's its calibration, NAME.xml"
+            Some(told) => format!("nor of the {} described by a file next to it", told.name()),
+            None => "and Ouster's need the sensor's metadata (NAME.json for NAME.pcap), an \
+                     HDL-64E's its calibration (NAME.xml)"
                 .into(),
         };
         let what = format!(
@@ -178,10 +178,10 @@ pub(super) fn streams(
 /// Notes on a stream for the user.
 pub(super) fn notes(stream: &Stream, counts: &FrameCounts) -> Vec<String> {
     let all = [
-        (format!("packets with a wrong check sum, of {}", stream.packets), stream.unsound),
+        (format!("packets with a wrong checksum, of {}", stream.packets), stream.unsound),
         ("late firings".into(), stream.late),
-        ("frames that are cut or damaged".into(), counts.cut),
-        ("frames of unknown links".into(), counts.strange),
+        ("truncated or damaged frames".into(), counts.cut),
+        ("frames of unknown link types".into(), counts.strange),
     ];
     let told = all.into_iter().filter(|(_, count)| *count > 0);
     let mut notes: Vec<String> =
@@ -207,9 +207,9 @@ pub(super) fn choose(
         [] => wrong(format!("several sensors, choose one with --topic: {listed}")),
         [one] => match streams.iter().position(|s| s.sender.to_string() == *one) {
             Some(n) => Ok(streams.swap_remove(n)),
-            None => wrong(format!("no sensor sends as {one}; there are: {listed}")),
+            None => wrong(format!("no sensor sends as {one}; available: {listed}")),
         },
-        _ => wrong("one sensor of a capture can be read, several are asked for".into()),
+        _ => wrong("only one sensor of a capture can be read, several are requested".into()),
     }
 }
 

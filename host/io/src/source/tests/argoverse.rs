@@ -211,7 +211,10 @@ fn dictionaries_are_refused() {
     let columns = vec![("class", Arc::new(names) as ArrayRef), ("x", floats(vec![1.0; 3]))];
     let bytes = file(&[batch(columns)], None);
     let e = FeatherTable::parse(Path::new("f.feather"), &bytes, &["x"]).err().unwrap();
-    assert_eq!(e.to_string(), "f.feather: has columns coded by dictionary: write them plainly");
+    assert_eq!(
+        e.to_string(),
+        "f.feather: has dictionary-encoded columns: write them as plain columns"
+    );
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn pcd_bodies_that_end_early() {
     assert!(cloud(&t, "a.pcd", &packed[..packed.len() - 1]).unwrap_err().contains("packed bytes"));
     assert!(cloud(&t, "a.pcd", &packed[..packed.len() - 53]).unwrap_err().contains("two lengths"));
     let short = cloud(&t, "a.pcd", compressed(&[1; 49])).unwrap_err();
-    assert!(short.contains("unpacks to 49 bytes, the header asks for 50"), "{short}");
+    assert!(short.contains("unpacks to 49 bytes, the header expects 50"), "{short}");
     let bomb = String::from_utf8_lossy(&packed)
         .replace("POINTS 2", "POINTS 2000000")
         .replace("WIDTH 2", "WIDTH 2000000");

@@ -91,11 +91,11 @@ fn what_is_wrong_with_scenes_is_told() {
     let error = |options: &OpenOptions| open(t.path(), options).err().unwrap().to_string();
     let says = error(&OpenOptions::default());
     assert!(says.contains("2 scenes, choose with --topic: scene-0061, scene-0103"), "{says}");
-    assert!(error(&asked("scene-1")).contains("no scene scene-1; there are: scene-0061"));
+    assert!(error(&asked("scene-1")).contains("no scene scene-1; available: scene-0061"));
     let missing = open(t.path(), &asked("scene-0103")).unwrap().read(0, &mut SweepData::default());
     assert!(missing.unwrap_err().to_string().contains("other"));
     let poses = OpenOptions { poses: Some("p.txt".into()), ..asked("scene-0061") };
-    assert!(error(&poses).contains("bring their own poses"));
+    assert!(error(&poses).contains("contain their own poses"));
     let changes = [
         ("ego_pose", "\"p2\"", "\"q\"", "has no token p2"),
         ("ego_pose", "[1, 0, 0, 0]", "[1, 1, 0, 0]", "token p"),

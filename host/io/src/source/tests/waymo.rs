@@ -155,7 +155,7 @@ fn what_is_wrong_with_segments_is_told() {
         let topics = names.iter().map(|name| (*name).into()).collect();
         open(t.path(), &OpenOptions { topics, ..OpenOptions::default() }).err().unwrap().to_string()
     };
-    assert!(asked(&["x"]).contains("no segment x; there are: seg"));
+    assert!(asked(&["x"]).contains("no segment x; available: seg"));
     assert!(asked(&["x", "y"]).contains("one segment at a time"));
     fs::copy(t.path().join("lidar/seg.parquet"), t.path().join("lidar/two.parquet")).unwrap();
     assert!(asked(&[]).contains("2 segments, choose with --topic: seg, two"));
@@ -194,7 +194,7 @@ fn what_is_wrong_with_segments_is_told() {
     );
     fs::copy(from, to).unwrap();
     let e = open(t.path(), &OpenOptions::default()).err().unwrap().to_string();
-    assert!(e.contains("neither inclinations of beams nor their range"), "{e}");
+    assert!(e.contains("neither beam inclinations nor their range"), "{e}");
     let t = segment(1);
     let e = open(t.path(), &OpenOptions::default()).unwrap().read(0, &mut SweepData::default());
     let e = e.unwrap_err().to_string();

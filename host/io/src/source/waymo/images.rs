@@ -43,13 +43,13 @@ impl RangeLaser {
             return Err(format!("pixels of {channels} numbers, at least {CHANNELS_MIN} expected"));
         }
         if !self.inclinations.is_empty() && self.inclinations.len() != rows {
-            return Err(format!("{rows} rows, {} beams", self.inclinations.len()));
+            return Err(format!("{rows} rows, but {} beams", self.inclinations.len()));
         }
         let fits = |poses: &Image| {
             [poses.rows, poses.columns, poses.channels] == [rows, columns, POSE_CHANNELS]
         };
         if pixels.is_some_and(|(poses, _)| !fits(poses)) {
-            return Err(format!("poses are not of {rows} x {columns} pixels"));
+            return Err(format!("the pixel poses are not {rows} x {columns}"));
         }
         let inclinations: Vec<(f64, f64)> =
             (0..rows).map(|row| self.inclination(row, rows)).collect();

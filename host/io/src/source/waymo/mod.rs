@@ -72,7 +72,7 @@ impl Waymo {
     /// Opens a segment: the one named as topic, or the only one.
     pub fn open(root: &Path, options: &OpenOptions) -> Result<Waymo, Error> {
         if options.poses.is_some() || options.poses_frame.is_some() {
-            let what = "segments of Waymo's bring their own poses; --poses does not apply";
+            let what = "Waymo segments contain their own poses; --poses does not apply";
             return Err(Error::Usage(what.into()));
         }
         let segment = segment(root, &options.topics)?;
@@ -186,9 +186,9 @@ fn segment(root: &Path, topics: &[String]) -> Result<String, Error> {
         [] => format!("{} segments, choose with --topic: {some}{more}", names.len()),
         [asked] => match names.contains(asked) {
             true => return Ok(asked.clone()),
-            false => format!("no segment {asked}; there are: {some}{more}"),
+            false => format!("no segment {asked}; available: {some}{more}"),
         },
-        _ => return Err(Error::Usage("one segment at a time (--topic)".into())),
+        _ => return Err(Error::Usage("only one segment at a time (--topic)".into())),
     };
     Err(Error::input(&folder, "", what))
 }
@@ -215,7 +215,7 @@ fn lasers(path: &Path) -> Result<BTreeMap<i64, RangeLaser>, Error> {
         let values = row.numbers(&names[2])?;
         let range = [row.number(&names[0])?, row.number(&names[1])?];
         if values.iter().chain(range.iter().filter(|_| values.is_empty())).any(|v| !v.is_finite()) {
-            let what = "neither inclinations of beams nor their range, or none that are finite";
+            let what = "neither beam inclinations nor their range, or not finite ones";
             return Err(Error::input(path, "", what));
         }
         let vehicle_from_laser = pose(&row.numbers(EXTRINSIC)?, path)?;

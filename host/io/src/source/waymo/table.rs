@@ -165,7 +165,7 @@ impl ParquetTable {
             let bytes = read_at(&self.file, within.start, room.min(left))?;
             match thrift::page_header(&bytes) {
                 Some(header) => return Ok(header),
-                None if room >= left => return Err(damaged("header of a page")),
+                None if room >= left => return Err(damaged("page header")),
                 // Long if it has statistics of long strings.
                 None => room *= 16,
             }
@@ -221,7 +221,7 @@ fn read_at(mut file: &File, from: u64, count: u64) -> Result<Vec<u8>, ParquetErr
 }
 
 fn damaged(what: &str) -> ParquetError {
-    ParquetError::General(format!("damaged: the {what}"))
+    ParquetError::General(format!("damaged {what}"))
 }
 
 /// Count of numbers in a row of a type, whatever it contains.
@@ -265,11 +265,11 @@ impl ImageRows {
         let (Some(rows), Some(columns), Some(channels), 3) =
             (size(0), size(1), size(2), shape.len())
         else {
-            return Err(wrong(format!("an image of shape {shape:?}")));
+            return Err(wrong(format!("an image of invalid shape {shape:?}")));
         };
         let list = row.list(values)?;
         let values = list.as_primitive_opt::<Float32Type>();
-        let values = values.ok_or_else(|| wrong("an image that is not of float32".into()))?;
+        let values = values.ok_or_else(|| wrong("an image that is not float32".into()))?;
         let pixels = rows.checked_mul(columns).and_then(|n| n.checked_mul(channels));
         if pixels.is_none_or(|n| n > NUMBERS_MAX || n != values.len()) {
             return Err(wrong(format!("{} numbers for an image of {shape:?}", values.len())));
@@ -307,7 +307,7 @@ impl TableRow<'_> {
         let column = self.column(name)?;
         let list = column.as_list_opt::<i32>().map(|c| c.value(self.row));
         let fixed = || column.as_fixed_size_list_opt().map(|c| c.value(self.row));
-        list.or_else(fixed).ok_or_else(|| self.wrong(name, "is no list"))
+        list.or_else(fixed).ok_or_else(|| self.wrong(name, "is not a list"))
     }
 
     /// The numbers of a list; empty if it is null.
@@ -321,7 +321,7 @@ impl TableRow<'_> {
             let values = list.as_primitive_opt::<Int32Type>()?.values().iter();
             Some(values.map(|v| f64::from(*v)).collect())
         };
-        floats.or_else(whole).ok_or_else(|| self.wrong(name, "is no list of float64 or int32"))
+        floats.or_else(whole).ok_or_else(|| self.wrong(name, "is not a list of float64 or int32"))
     }
 }
 

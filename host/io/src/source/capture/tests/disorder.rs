@@ -83,7 +83,7 @@ fn several_sensors() {
         |topic: &str| OpenOptions { ground_m: Some(-2.0), topics: vec![topic.into()], ..options() };
     assert_eq!(Capture::open(&path, &choose("10.0.0.8:2368")).unwrap().len(), 3);
     let what = Capture::open(&path, &choose("x")).err().unwrap().to_string();
-    assert!(what.contains("no sensor sends as x; there are: 10.0.0.9:2368 (VLP-16"), "{what}");
+    assert!(what.contains("no sensor sends as x; available: 10.0.0.9:2368 (VLP-16"), "{what}");
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn mistakes() {
     assert!(what.contains("among 0 datagrams of at most 0 bytes, and Ouster's need"), "{what}");
     let folder = Temp::new();
     let path = folder.write("x.pcap", b"no capture at all, whatever its name says");
-    assert!(wrong(&path).contains("no pcap or pcapng file begins so"), "{}", wrong(&path));
+    assert!(wrong(&path).contains("not a pcap or pcapng file"), "{}", wrong(&path));
     // The metadata of another sensor, and none at all.
     let capture = fs::read(packets("OS-1-128_v2.3.0_1024x10_lb_n3.pcap")).unwrap();
     let path = folder.write("y.pcap", &capture);
@@ -121,7 +121,7 @@ fn mistakes() {
     let (_folder, capture) = made(&from_one(&packets));
     let capture = capture.unwrap();
     let notes = capture.notes().join("\n");
-    assert!(notes.contains("the sensor's clock was set, one turn is assumed there: 1 times"));
+    assert!(notes.contains("the sensor's clock was set, one revolution is assumed there: 1 times"));
     let stamps_s = &capture.overview.track.stamps_s;
     assert!(stamps_s.windows(2).all(|pair| (0.01..0.11).contains(&(pair[1] - pair[0]))));
     assert_eq!(Format::Pcap, crate::source::recognise(&path).unwrap().0);

@@ -124,20 +124,20 @@ fn two_returns_of_a_beam() {
 fn calibrations_that_are_none() {
     let folder = Temp::new();
     let path = recorded(&folder, &packets(false)[..10]);
-    assert!(wrong(&path).contains("an HDL-64E's its calibration, NAME.xml"), "{}", wrong(&path));
+    assert!(wrong(&path).contains("an HDL-64E's its calibration (NAME.xml)"), "{}", wrong(&path));
     let own = calibration();
     for (from, to, expected) in [
-        ("<id_>63</id_>", "<id_>62</id_>", "two lasers of id_ 62"),
-        ("<id_>63</id_>", "<id_>64</id_>", "a laser of id_ 64"),
-        ("<id_>63</id_>", "<id_>-1</id_>", "`-1` is no such number"),
-        (&laser(63, [0.0, DOWN, 0.0, 0.0, 0.0, 0.0, 0.0]), "", "the one of id_ 63 is missing"),
-        (">-4.98<", ">NaN<", "laser of id_ 0: rotCorrection_: NaN is beyond 360"),
+        ("<id_>63</id_>", "<id_>62</id_>", "two lasers have id_ 62"),
+        ("<id_>63</id_>", "<id_>64</id_>", "laser id_ 64 is out of range"),
+        ("<id_>63</id_>", "<id_>-1</id_>", "`-1` is not a valid number"),
+        (&laser(63, [0.0, DOWN, 0.0, 0.0, 0.0, 0.0, 0.0]), "", "the one with id_ 63 is missing"),
+        (">-4.98<", ">NaN<", "laser with id_ 0: rotCorrection_: NaN is beyond 360"),
         (">110<", ">11000<", "distCorrection_: 11000 is beyond 1000"),
         (">0.2<", ">20<", "distLSB_: a unit of 0.2 m"),
-        (">0.2<", ">two<", "distLSB_: `two` is no such number"),
+        (">0.2<", ">two<", "distLSB_: `two` is not a valid number"),
         ("<!DOCTYPE boost_serialization>", "<!ENTITY a \"b\">", "defines entities"),
         ("<DB>", "<DB xmlns:a=\"b\">", "has namespaces"),
-        ("</DB>", "", "no XML"),
+        ("</DB>", "", "not valid XML"),
     ] {
         assert!(own.contains(from), "{from}");
         folder.write("made.xml", own.replace(from, to));

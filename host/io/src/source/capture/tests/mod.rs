@@ -229,19 +229,19 @@ fn any_order_and_poses() {
         assert!(sweep.points.len() > 90_000);
     }
     let refused = Capture::open(&path, &OpenOptions::default()).err().unwrap().to_string();
-    assert!(refused.ends_with("packets of a sensor: poses are needed, give a file with --poses"));
+    assert!(refused.ends_with("sensor packets only: poses are needed, give a file with --poses"));
 }
 
 #[test]
 fn check_sums() {
-    let told = |source: &Capture| source.notes().iter().any(|n| n.contains("wrong check sum"));
+    let told = |source: &Capture| source.notes().iter().any(|n| n.contains("wrong checksum"));
     assert!(!told(&opened(&packets("crc_test.pcap"))));
     let folder = Temp::new();
     folder.write("x.json", fs::read(packets("crc_test.json")).unwrap());
     let mut bytes = fs::read(packets("crc_test.pcap")).unwrap();
     bytes[50_000] ^= 1;
     let source = opened(&folder.write("x.pcap", bytes));
-    let expected = "left out: packets with a wrong check sum, of 34 (1)";
+    let expected = "left out: packets with a wrong checksum, of 34 (1)";
     assert!(told(&source) && source.notes().iter().any(|n| n == expected), "{:?}", source.notes());
 }
 
