@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let done = write(&args.out, &recipe, args.drives, args.jobs.unwrap_or_else(cores), false)?;
     let (sweeps, elapsed_s) = (done.drives * recipe.sweeps, start.elapsed().as_secs_f64());
     println!(
-        "{}: {} drives written, {} already there; {sweeps} sweeps in {elapsed_s:.1} s, {:.2} a second",
+        "{}: {} drives written, {} already there; {sweeps} sweeps in {elapsed_s:.1} s, {:.2}/s",
         args.out.display(),
         done.drives,
         done.skipped,
