@@ -150,7 +150,7 @@ pub fn evaluate(
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     if !source.is_located() {
-        let what = "labels are placed by poses: compute them with `raywake odometry`, then pass --poses FILE";
+        let what = "labels are placed by poses: `raywake odometry` computes them, for --poses FILE";
         return Err(Error::input(path, "", what).into());
     }
     let files = Files::of(out, name);

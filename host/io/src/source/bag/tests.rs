@@ -40,8 +40,7 @@ pub(crate) fn options() -> WriteOptions {
     WriteOptions::new().compression(Some(Compression::Zstd)).chunk_size(Some(50_000))
 }
 
-/// A floor around a sensor `height_m` above it, and a post 5 m ahead; times spread over a
-/// revolution.
+/// A floor, a sensor `height_m` above it and a post 5 m ahead; times spread over a revolution.
 fn cloud(stamp_ns: u64, frame: &str, height_m: f32) -> Vec<u8> {
     let floor = (0..1600).map(|n| [(n / 40) as f32 - 19.5, (n % 40) as f32 - 19.5, -height_m]);
     let post = (0..10).map(|n| [5.0, 0.0, 0.1 * n as f32 - height_m]);
