@@ -151,11 +151,11 @@ fn in_a_run_the_scalar_backend_goes_on() {
         // Two programs have run before the first sweep.
         let call = failing + 3;
         for (n, (name, result, told)) in [
-            ("vkQueueSubmit", LOST, "device lost during `flow`, says vkQueueSubmit"),
-            ("vkWaitForFences", LOST, "device lost during `flow`, says vkWaitForFences"),
-            ("vkWaitForFences", TIMEOUT, "no end of `flow` within 10s"),
+            ("vkQueueSubmit", LOST, "device lost during `flow`, reported by vkQueueSubmit"),
+            ("vkWaitForFences", LOST, "device lost during `flow`, reported by vkWaitForFences"),
+            ("vkWaitForFences", TIMEOUT, "`flow` did not finish within 10s"),
             ("vkResetFences", OUT_OF_HOST_MEMORY, "vkResetFences failed"),
-            ("vkWaitForFences", GARBAGE, "`flow` left nonsense behind"),
+            ("vkWaitForFences", GARBAGE, "`flow` left invalid results behind"),
         ]
         .into_iter()
         .enumerate()

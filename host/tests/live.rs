@@ -198,7 +198,7 @@ fn a_device_that_fails() {
     recorded(&t);
     let library = common::faulty_layer();
     let path = t.path().join("street.pcap");
-    for (result, told) in [(-4, "device lost during"), (2, "no end of `flow` within 500ms")] {
+    for (result, told) in [(-4, "device lost during"), (2, "`flow` did not finish within 500ms")] {
         let more = ["--backend", "vulkan", "--deadline", "50", "--replay"];
         let mut command = live(&t, &[&more[..], &[path.to_str().unwrap()]].concat());
         command.envs(raywake_faulty_layer::environment(t.path(), &library).unwrap());
