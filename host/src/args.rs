@@ -43,6 +43,7 @@ Exit codes:
     4  an output file cannot be written
     5  Vulkan device error
     6  more memory needed than `budget --limit` allows or the machine has
+    7  memory was allocated during a sweep: an internal error
   130  interrupted; results so far are kept";
 
 /// Temporal scene flow from LIDAR sweeps and poses.
