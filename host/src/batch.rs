@@ -69,7 +69,7 @@ pub trait RecordingCommand: Clone + Debug {
     fn single_file(&self) -> Option<&'static str>;
 
     /// Runs the command on one recording. Returns whether it ran to completion.
-    fn carry_out(&self) -> Result<bool, RunError>;
+    fn execute(&self) -> Result<bool, RunError>;
 }
 
 /// A recording, and where its results go below the output folder.
@@ -97,7 +97,7 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     let mut own = command.clone();
     let SharedArgs { recordings: Recordings { list, shard, .. }, quiet, .. } = own.shared();
     let (shard, quiet) = (*shard, *quiet);
-    let Some(list) = list else { return command.carry_out() };
+    let Some(list) = list else { return command.execute() };
     if let Some(option) = command.single_file() {
         let what = format!("--{option} is for a single recording and cannot be used with --list");
         return Err(Error::Usage(what).into());
@@ -185,15 +185,14 @@ fn finish(
     data: &Path,
     seal: &str,
 ) -> Result<Option<bool>, RunError> {
-    let Some(out) = command.out() else { return command.carry_out().map(Some) };
+    let Some(out) = command.out() else { return command.execute().map(Some) };
     let done = out.join(DONE);
     let seal = format!("{seal}, {}\n", inventory(data)?);
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }
-    let whole = inputs::spare("out", out, data)
-        .map_err(RunError::from)
-        .and_then(|()| command.carry_out())?;
+    let whole =
+        inputs::spare("out", out, data).map_err(RunError::from).and_then(|()| command.execute())?;
     if whole {
         atomic::write(&done, |to| to.write_all(seal.as_bytes()))?;
     }
@@ -334,7 +333,7 @@ mod tests {
             None
         }
 
-        fn carry_out(&self) -> Result<bool, RunError> {
+        fn execute(&self) -> Result<bool, RunError> {
             let out = self.out.clone().unwrap();
             fs::create_dir_all(&out).unwrap();
             fs::OpenOptions::new()
@@ -351,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn all_are_tried_and_none_twice() {
+    fn each_is_tried_exactly_once() {
         let folder = tempfile::tempdir().unwrap();
         let names = ["a", "b", "c", "d", "e"].map(|name| folder.path().join(name));
         names.iter().for_each(|name| fs::create_dir(name).unwrap());

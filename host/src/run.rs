@@ -53,7 +53,7 @@ impl RecordingCommand for args::RunArgs {
         self.results.single_file()
     }
 
-    fn carry_out(&self) -> Result<bool, RunError> {
+    fn execute(&self) -> Result<bool, RunError> {
         Ok(!run(self)?.facts.interrupted)
     }
 }

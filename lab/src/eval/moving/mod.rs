@@ -57,8 +57,8 @@ fn per_sweep(count: u64, sweeps: u64) -> Cell {
 
 impl MotionCounts {
     /// Counts one at this distance from the nearest mover's box, m.
-    pub fn add(&mut self, moves: bool, put_out: bool, mover_m: f32) {
-        match (moves, put_out) {
+    pub fn add(&mut self, moves: bool, reported: bool, mover_m: f32) {
+        match (moves, reported) {
             (true, true) => self.found += 1,
             (true, false) => self.missed += 1,
             (false, true) => self.wrong[zone(mover_m)] += 1,
@@ -172,8 +172,8 @@ mod tests {
         let mut counts = MotionCounts::default();
         let cases = [(true, true, 0.0), (true, false, 0.0), (false, true, 0.5), (false, true, 1.9)];
         let more = [(true, true, 0.0), (false, true, f32::INFINITY), (false, false, 0.1)];
-        for (moves, put_out, mover_m) in cases.into_iter().chain(more) {
-            counts.add(moves, put_out, mover_m);
+        for (moves, reported, mover_m) in cases.into_iter().chain(more) {
+            counts.add(moves, reported, mover_m);
         }
         assert_eq!(counts, MotionCounts { found: 2, missed: 1, wrong: [1, 1, 1] });
         let mut twice = counts;
