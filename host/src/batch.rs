@@ -63,7 +63,7 @@ pub trait RecordingCommand: Clone + Debug {
     fn out(&self) -> Option<&Path>;
 
     /// Redirects the results.
-    fn set_out(&mut self, out: PathBuf);
+    fn set_output(&mut self, out: PathBuf);
 
     /// The option given, if any, that names a single file, which several recordings cannot share.
     fn single_file(&self) -> Option<&'static str>;
@@ -174,7 +174,7 @@ impl Tally {
 fn command_for<C: RecordingCommand>(command: &C, at: &ListedRecording) -> C {
     let mut one = command.clone();
     let out = command.out().map(|out| out.join(&at.place));
-    out.into_iter().for_each(|out| one.set_out(out));
+    out.into_iter().for_each(|out| one.set_output(out));
     *one.shared().recordings = Recordings::one(at.data.clone());
     one
 }
@@ -203,7 +203,7 @@ fn finish(
 /// settings or weights are invalid.
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
-    plain.set_out(PathBuf::new());
+    plain.set_output(PathBuf::new());
     let SharedArgs { recordings, flow, quiet } = plain.shared();
     // Results are the same on each backend.
     (*recordings, flow.backend, *quiet) = (Recordings::default(), BackendChoice::default(), true);
@@ -325,7 +325,7 @@ mod tests {
             self.out.as_deref()
         }
 
-        fn set_out(&mut self, out: PathBuf) {
+        fn set_output(&mut self, out: PathBuf) {
             self.out = Some(out);
         }
 

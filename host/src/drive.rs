@@ -156,7 +156,7 @@ impl Drive {
 
     /// Whether columns and returns are classified.
     pub fn has_classes(&self) -> bool {
-        self.active().pipeline.encoder.is_on()
+        self.active().pipeline.encoder.has_weights()
     }
 
     /// Tracklets after the last step.

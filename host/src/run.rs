@@ -45,7 +45,7 @@ impl RecordingCommand for args::RunArgs {
         self.results.out.as_deref()
     }
 
-    fn set_out(&mut self, out: PathBuf) {
+    fn set_output(&mut self, out: PathBuf) {
         self.results.out = Some(out);
     }
 

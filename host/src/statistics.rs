@@ -195,7 +195,7 @@ impl Statistics {
     }
 
     /// Returns the share of pairs within [`BUDGET_MS`]; `None` without pairs.
-    pub fn share_in_time(&self) -> Option<f64> {
+    pub fn share_within_budget(&self) -> Option<f64> {
         let within = self.totals.iter().filter(|ms| **ms < BUDGET_MS).count();
         (!self.totals.is_empty()).then(|| within as f64 / self.totals.len() as f64)
     }

@@ -242,7 +242,7 @@ impl RecordingCommand for args::CleanArgs {
         Some(&self.out)
     }
 
-    fn set_out(&mut self, out: PathBuf) {
+    fn set_output(&mut self, out: PathBuf) {
         self.out = out;
     }
 

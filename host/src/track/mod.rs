@@ -129,7 +129,7 @@ impl RecordingCommand for args::TrackArgs {
         self.out.as_deref()
     }
 
-    fn set_out(&mut self, out: PathBuf) {
+    fn set_output(&mut self, out: PathBuf) {
         self.out = Some(out);
     }
 

@@ -66,7 +66,7 @@ impl Wanted {
         }
     }
 
-    fn is_met(&self) -> bool {
+    fn is_satisfied(&self) -> bool {
         self.parked == 0 && self.moving.iter().all(|m| m.1 == 0)
     }
 
@@ -123,7 +123,7 @@ pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
     let mut wanted = wanted.clone();
     let mut sets = Sets { stationary: Vec::new(), moving: Vec::new() };
     for number in 0..DRIVES_MAX {
-        if wanted.is_met() {
+        if wanted.is_satisfied() {
             break;
         }
         let drive = drive(seed, number);

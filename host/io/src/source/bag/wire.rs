@@ -71,7 +71,7 @@ impl<'a> Wire<'a> {
     }
 
     /// Whether numbers are big-endian.
-    pub fn is_big(&self) -> bool {
+    pub fn is_big_endian(&self) -> bool {
         self.big
     }
 
