@@ -84,7 +84,7 @@ fn compile(
     let index = index.unwrap_or_else(|| fail(format!("no entry point `{}`", declared.name)));
     let entry = &module.entry_points[index];
     let mut bindings = reflect::bindings(&module, info.get_entry_point(index));
-    if let Some(what) = mistake(declared, &bindings, arguments) {
+    if let Some(what) = contradiction(declared, &bindings, arguments) {
         fail(format!("`{}` {what}", declared.name));
     }
     bindings.truncate(declared.arguments.len());
@@ -94,7 +94,7 @@ fn compile(
 }
 
 /// What an entry point does with its bindings in contradiction to its stage, if anything.
-fn mistake(
+fn contradiction(
     declared: &stages::Entry,
     bindings: &[reflect::Bound],
     arguments: &[raywake_core::stages::Argument],

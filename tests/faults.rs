@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 const SOON: Duration = Duration::from_secs(5);
 
 #[test]
-fn a_device_that_is_not_there() {
+fn a_missing_device() {
     if !vulkan::available() {
         return;
     }
@@ -92,7 +92,7 @@ fn set_up_time(setup: &Setup) -> Option<Duration> {
 }
 
 #[test]
-fn a_drive_that_misses_its_deadline_says_so_for_good() {
+fn a_missed_deadline_is_reported_from_then_on() {
     let setup = slow();
     let Some(enough) = set_up_time(&setup) else { return };
     let options = Options { timeout: enough, ..Options::default() };

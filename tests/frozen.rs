@@ -40,7 +40,7 @@ fn main() {
 /// Runs all checks. Returns digests of the results.
 fn run() -> Vec<u64> {
     println!("threads: {}", team::threads());
-    the_team_is_watched();
+    the_team_is_guarded();
     let mut passed = 1;
     let mut digests = Vec::new();
     for filter in [None, Some(background_filter::SHIPPED.to_string())] {
@@ -61,7 +61,7 @@ fn run() -> Vec<u64> {
 }
 
 /// A deliberate allocation, in a step or in work that another thread may take over from it.
-fn the_team_is_watched() {
+fn the_team_is_guarded() {
     let allocate = || drop(black_box(vec![1u8; 100]));
     let told = |section, work: &dyn Fn()| {
         let step = Sealed::new(section, ()).step(|()| {

@@ -56,12 +56,12 @@ fn assert_printed(name: &str, text: &str) {
 }
 
 #[test]
-fn the_memory_layout_is_what_the_code_says() {
+fn the_memory_layout_matches_the_code() {
     assert_printed("memory-layout.md", &budget::memory_layout(&budget::shipped()));
 }
 
 #[test]
-fn the_parameters_are_what_the_code_says() {
+fn the_parameters_match_the_code() {
     assert_printed("PARAMETERS.md", &budget::parameters());
 }
 
@@ -94,7 +94,7 @@ fn fields(source: &str) -> String {
 }
 
 #[test]
-fn fields_of_pythons_records_are_what_the_code_says() {
+fn fields_of_python_records_match_the_code() {
     let mut text = String::from(
         "# Fields of the arrays of records\n\nWritten by a test from the records' sources; \
          `UPDATE=1` rewrites it.\nFrames: x forward, y left, z up; the world's is that of the \
@@ -107,7 +107,7 @@ fn fields_of_pythons_records_are_what_the_code_says() {
 }
 
 #[test]
-fn every_kernel_lies_where_its_twin_does() {
+fn every_kernel_is_placed_like_its_twin() {
     let folder = root().join("kernels/wgsl");
     let mut alone = BTreeSet::new();
     for file in files(&folder, ".wgsl") {

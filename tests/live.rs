@@ -63,11 +63,11 @@ fn a_viewer_sees_all_of_it() {
     let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let streams = StreamTargets { live: Some(free), ..StreamTargets::default() };
     let mut sink = BagSink::create(&streams, 0, Content::Objects).unwrap().unwrap();
-    assert!(!sink.is_watched());
+    assert!(!sink.has_viewer());
     let taken = BagSink::create(&streams, 0, Content::Flow).err().unwrap().to_string();
     assert!(taken.contains("--live 127.0.0.1:"), "{taken}");
     let viewer = thread::spawn(move || seen(free));
-    while !sink.is_watched() {
+    while !sink.has_viewer() {
         thread::sleep(Duration::from_millis(5));
     }
     let objects = [TrackedObject::default(), TrackedObject { id: 1, ..TrackedObject::default() }];

@@ -85,7 +85,7 @@ fn check_dense(profile: &Profile, simulated: &SimSweep, map: &Map) {
 }
 
 #[test]
-fn both_routes_give_one_answer() {
+fn both_routes_give_the_same_answer() {
     for maps in [Some(scalar()), device()].into_iter().flatten() {
         for (simulated, map) in street().iter().zip(maps) {
             check_dense(&Profile::hdl64(), simulated, map);
@@ -97,7 +97,7 @@ fn both_routes_give_one_answer() {
 }
 
 #[test]
-fn both_backends_give_one_map() {
+fn both_backends_give_the_same_map() {
     let Some(device) = device() else { return };
     for (n, (found, wanted)) in device.iter().zip(scalar()).enumerate() {
         assert_eq!(difference(&found.voxels, &wanted.voxels), None, "sweep {n}");

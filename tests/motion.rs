@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// Observations from which on a tracklet's velocity is checked.
 const AGE: u32 = 10;
 /// Columns of an object, over all sweeps, below which no conclusion is drawn.
-const ENOUGH: usize = 50;
+const COLUMNS_MIN: usize = 50;
 /// Largest median error, m/s.
 const LIMIT: f64 = 0.4;
 /// Speed above which something counts as moving, m/s.
@@ -41,7 +41,7 @@ fn drives() -> [(&'static str, Drive); 3] {
     let straight = Path::from(State { speed: 8.0, ..State::default() });
     let turning = Path::from(State { speed: 5.0, ..State::default() }).then(5.0, 0.0, 0.06);
     let options = || Options { sweeps: 60, ..Options::default() };
-    [("standing", Path::standing(0.0, 0.0, 0.0)), ("moving", straight), ("turning", turning)]
+    [("standing", Path::stationary(0.0, 0.0, 0.0)), ("moving", straight), ("turning", turning)]
         .map(|(name, path)| (name, Drive::through(scene(), path, 1, options())))
 }
 
@@ -103,7 +103,7 @@ fn tracklets_recover_the_velocity_of_moving_objects() {
             println!(
                 "{case}: object {id}, {speed:4.1} m/s: {off:.2} m/s off, each {each:.2}, {count} columns"
             );
-            if count < ENOUGH {
+            if count < COLUMNS_MIN {
                 continue;
             }
             held += 1;
@@ -121,12 +121,12 @@ fn tracklets_recover_the_velocity_of_moving_objects() {
 
 /// Past parked cars, houses and trees, where only the vehicle moves.
 #[test]
-fn nothing_moves_in_a_street_that_stands() {
+fn nothing_moves_in_a_static_street() {
     // Counts of moving columns and of all: on parked cars, and away from any object.
     let (mut parked, mut background) = ([0; 2], [0; 2]);
     for seed in [5, 6, 7] {
         let mut scene = Scene::street(seed);
-        scene.objects.retain(|o| o.is_still());
+        scene.objects.retain(|o| o.is_static());
         let path = Path::from(State { x: -20.0, y: -1.75, yaw: 0.0, speed: 12.0 });
         let drive = Drive::through(scene, path, seed, Options { sweeps: 40, ..Options::default() });
         follow(&drive, |columns, objects| {

@@ -87,7 +87,7 @@ fn keep(sweep: &mut SimSweep, keep: impl Fn(Class) -> bool) {
 /// A street where only the vehicle moves.
 fn still_street() -> Drive {
     let mut scene = Scene::street(5);
-    scene.objects.retain(|o| o.is_still());
+    scene.objects.retain(|o| o.is_static());
     let path = Path::from(State { x: -20.0, y: -1.75, yaw: 0.0, speed: 8.0 });
     Drive::through(scene, path, 5, Options { sweeps: 12, ..Options::default() })
 }
@@ -126,7 +126,7 @@ fn all_returns_in_one_column() {
 }
 
 #[test]
-fn a_still_street_without_its_ground_stands_as_well_as_with_it() {
+fn a_static_street_is_static_with_and_without_its_ground() {
     let whole = run(Profile::hdl64(), &still_street(), |_| ());
     let tally = run(Profile::hdl64(), &still_street(), |s| keep(s, |c| c != Class::Ground));
     // Within a twentieth: 168 returns move without the ground and 514 with it.
@@ -135,14 +135,14 @@ fn a_still_street_without_its_ground_stands_as_well_as_with_it() {
 }
 
 #[test]
-fn ground_alone_stands() {
+fn ground_alone_is_static() {
     let tally = run(Profile::hdl64(), &still_street(), |s| keep(s, |c| c == Class::Ground));
     assert!(tally.returns > 100_000 && tally.moving[0] == 0, "{tally:?}");
 }
 
 /// Nothing reveals how fast one drives along it, so nothing may be reported as moving either.
 #[test]
-fn a_wall_and_a_tunnel_stand() {
+fn a_wall_and_a_tunnel_are_static() {
     let mut wall = Scene::empty();
     block(&mut wall, [400.0, 1.0, 12.0], [0.0, 3.0, 0.0]);
     let mut tunnel = wall.clone();
@@ -156,7 +156,7 @@ fn a_wall_and_a_tunnel_stand() {
 
 /// People all around walk along with the vehicle; the houses next to them stay put.
 #[test]
-fn in_a_crowd_people_move_and_houses_stand() {
+fn in_a_crowd_people_move_and_houses_are_static() {
     let mut scene = Scene::empty();
     for side in [-14.0, 14.0] {
         block(&mut scene, [120.0, 2.0, 8.0], [0.0, side, 0.0]);
@@ -177,7 +177,7 @@ fn in_a_crowd_people_move_and_houses_stand() {
 
 #[test]
 #[should_panic(expected = "returns of the sweep before")]
-fn returns_of_another_sweep_are_not_taken_for_those_of_the_one_before() {
+fn returns_of_another_sweep_are_not_mistaken_for_the_last() {
     let drive = through(Scene::empty(), 5.0);
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
     let mut pipeline = setup.drive(setup.scalar());

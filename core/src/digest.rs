@@ -138,7 +138,7 @@ mod tests {
 
     #[cfg(feature = "pipeline")]
     #[test]
-    fn any_number_of_a_return_shows() {
+    fn digest_covers_every_field_of_a_return() {
         use crate::output::{PointFlow, Status};
         let plain = PointFlow { probability: 0.25, ..PointFlow::default() };
         let of = |points: &[PointFlow]| {

@@ -226,13 +226,13 @@ impl<'a> SweepPair<'a> {
     /// [`ColumnFlow::probability`]; its covariances include that.
     pub fn set_static(&self, at: DVec3, flow: &mut ColumnFlow) {
         let p = flow.probability;
-        let despite = |covariance: &mut [f32; 3], by: &mut [f32; 2]| {
+        let as_static = |covariance: &mut [f32; 3], by: &mut [f32; 2]| {
             let [x, y] = core::mem::take(by);
             *covariance =
                 [covariance[0] + p * x * x, covariance[1] + p * x * y, covariance[2] + p * y * y];
         };
-        despite(&mut flow.displacement_covariance, &mut flow.displacement_m);
-        despite(&mut flow.covariance, &mut flow.velocity_world_mps);
+        as_static(&mut flow.displacement_covariance, &mut flow.displacement_m);
+        as_static(&mut flow.covariance, &mut flow.velocity_world_mps);
         self.set_relative(at, flow);
     }
 
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_cannot_be_told_are_borne() {
+    fn ambiguous_places_are_tolerated() {
         for far in [4e8, 1e13, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
             shifts([[0.0; 3], [far, 0.0, 0.0], [far, 1.0, 0.0], [-far, 0.0, 0.0], [0.0; 3]]);
             shifts([[far, 0.0, 0.0], [far, 1.0, 0.0], [far, 30.0, 0.0]]);

@@ -10,7 +10,7 @@
 
 use crate::params::{BAND_UPDATES, LOG_ODDS_PER_NAT, POINTS_MAX, TILE};
 use crate::stages::{MAP_BAND, MAP_COUNT, MAP_RAYS, Storage, run};
-use crate::team::Alone;
+use crate::team::SingleThread;
 
 const _: () = assert!(POINTS_MAX <= BAND_UPDATES);
 
@@ -68,14 +68,14 @@ pub fn occupancy_probability(log_odds_tenths: i32, clip_nats: f32) -> f32 {
 /// order of keys.
 pub fn map(storage: &mut Storage, bands: &mut Bands, mut put: impl FnMut(&[Update])) {
     let quiet = &mut |_| ();
-    run(MAP_RAYS, storage, 0, &Alone, quiet);
+    run(MAP_RAYS, storage, 0, &SingleThread, quiet);
     let done: Result<(), core::convert::Infallible> = bands.run(|from, to| {
         (storage.sweep.band_from, storage.sweep.band_to) = (from as i32, to as i32);
-        run(MAP_COUNT, storage, 0, &Alone, quiet);
+        run(MAP_COUNT, storage, 0, &SingleThread, quiet);
         if storage.count_tiles[TILE] as usize > BAND_UPDATES {
             return Ok(false);
         }
-        run(MAP_BAND, storage, 0, &Alone, quiet);
+        run(MAP_BAND, storage, 0, &SingleThread, quiet);
         put(&storage.scratch[..storage.run_tiles[TILE] as usize]);
         Ok(true)
     });

@@ -141,7 +141,7 @@ pub trait Perceive {
 }
 
 /// What does the work of a step, and what keeps its times.
-pub struct Machine<'a, P, T, C> {
+pub struct StepContext<'a, P, T, C> {
     /// From rays to flow.
     pub backend: &'a mut P,
     /// CPU threads; their number makes no difference to the results.

@@ -10,7 +10,7 @@ use crate::encoder::Encoder;
 use crate::frame::{Sides, SweepPair};
 use crate::output::{Output, SweepOutput, TrackletState};
 use crate::params::Profile;
-use crate::perceive::{Machine, Perceive, Perceived, StageTimer};
+use crate::perceive::{Perceive, Perceived, StageTimer, StepContext};
 use crate::prepare::{Placement, Setup};
 use crate::record::SweepUniform;
 use crate::refinement::Refinement;
@@ -62,12 +62,12 @@ impl Pipeline {
     pub fn step<'o, P: Perceive>(
         &mut self,
         setup: &Setup,
-        machine: Machine<P, impl Team, impl StageTimer + Send>,
+        machine: StepContext<P, impl Team, impl StageTimer + Send>,
         sweep: &Sweep,
         before: &'o [Point],
         out: Output<'o>,
     ) -> Result<SweepOutput<'o>, P::Error> {
-        let Machine { backend, team, timer } = machine;
+        let StepContext { backend, team, timer } = machine;
         let profile = &setup.profile;
         let sweep = &Sweep { twist: sweep.twist.to_grain(), ..*sweep };
         let arrival = self.sides.advance(profile, &setup.rig, sweep);
@@ -105,7 +105,8 @@ impl Pipeline {
                 returns: &self.returns,
                 scores: self.encoder.scores(),
             };
-            flows = Some(found.put_out(team, before, turnover, &mut self.flow_of_column, out));
+            flows =
+                Some(found.write_velocities(team, before, turnover, &mut self.flow_of_column, out));
             timer.lap("out");
         }
         self.encoder.keep(perceived.columns_now, profile.side as usize, [corner[0], corner[1]]);

@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_pose() {
+    fn invalid_poses() {
         let mut m = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         assert!(Pose::from_rows(&m).is_ok());
         m[0] = -1.0;

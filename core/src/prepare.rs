@@ -102,7 +102,7 @@ impl Preparation {
                 let rays = rays_left.split_off_mut(..of_part).expect("room");
                 let columns = columns.split_off_mut(..len).expect("as many");
                 let placed = placed.split_off_mut(..len.min(placed.len())).expect("no more");
-                Castings::new(rays, columns, placed)
+                CastReturns::new(rays, columns, placed)
             })
             .collect();
         team::each(team, 0, &mut parts, &|n, castings| {
@@ -217,7 +217,7 @@ impl<'a> Caster<'a> {
     }
 
     /// Casts the rays of some returns, and stores their columns and positions.
-    fn cast_all<'p>(&self, points: impl Iterator<Item = &'p Point>, out: &mut Castings) {
+    fn cast_all<'p>(&self, points: impl Iterator<Item = &'p Point>, out: &mut CastReturns) {
         let mut batch = ReturnBatch::new();
         let count = out.columns.len();
         for (n, point) in points.take(count).enumerate() {
@@ -235,7 +235,7 @@ impl<'a> Caster<'a> {
     }
 
     /// Casts the rays of a batch and empties it.
-    fn cast(&self, batch: &mut ReturnBatch, out: &mut Castings) {
+    fn cast(&self, batch: &mut ReturnBatch, out: &mut CastReturns) {
         let lattice = &self.lattice;
         let found = self.simd.run(
             #[inline(always)]
@@ -267,7 +267,7 @@ impl<'a> Caster<'a> {
 }
 
 /// The result of casting some returns.
-struct Castings<'a> {
+struct CastReturns<'a> {
     rays: &'a mut [Ray],
     /// Number of rays so far.
     count: usize,
@@ -276,16 +276,20 @@ struct Castings<'a> {
     dropped: DroppedReturns,
 }
 
-impl<'a> Castings<'a> {
-    fn new(rays: &'a mut [Ray], columns: &'a mut [u32], placed: &'a mut [Placed]) -> Castings<'a> {
-        Castings { rays, count: 0, columns, placed, dropped: DroppedReturns::ZERO }
+impl<'a> CastReturns<'a> {
+    fn new(
+        rays: &'a mut [Ray],
+        columns: &'a mut [u32],
+        placed: &'a mut [Placed],
+    ) -> CastReturns<'a> {
+        CastReturns { rays, count: 0, columns, placed, dropped: DroppedReturns::ZERO }
     }
 
     /// Marks a return as one that ends nowhere.
     fn leave_out(&mut self, n: usize) {
         self.columns[n] = NONE;
         if let Some(placed) = self.placed.get_mut(n) {
-            *placed = Placed::NOWHERE;
+            *placed = Placed::LEFT_OUT;
         }
     }
 }

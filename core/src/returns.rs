@@ -23,7 +23,7 @@ pub(crate) struct Returns {
 }
 
 /// A sweep as rays.
-pub(crate) struct Sent {
+pub(crate) struct SweepRays {
     pub uniform: SweepUniform,
     pub dropped: DroppedReturns,
 }
@@ -47,7 +47,7 @@ impl Returns {
         placement: &Placement,
         [shift_x, shift_y, shift_z]: [i32; 3],
         (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
-    ) -> Sent {
+    ) -> SweepRays {
         let profile = &setup.profile;
         self.now = 1 - self.now;
         let (columns, placed) = (&mut self.column[self.now], &mut self.placed);
@@ -64,7 +64,7 @@ impl Returns {
             score_min: setup.scores.min,
             ..uniform_of(profile, count)
         };
-        Sent { uniform, dropped }
+        SweepRays { uniform, dropped }
     }
 
     /// Passes the sent sweep on to the refinement. Returns the number of returns that this had no

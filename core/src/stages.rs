@@ -223,7 +223,7 @@ pub const FLOW: &[StageOp] = &[
     Run(stage!(
         window in window,
         (sweep, list foreground, foreground_index, quads pair_cost, mut min_cost),
-        scalar: by_rows::least_of_window,
+        scalar: by_rows::window_minima,
         GroupPerColumn
     )),
     Fill(Buffer::flow, 0),

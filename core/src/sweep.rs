@@ -28,7 +28,7 @@ pub struct Placed {
 
 impl Placed {
     /// A return that was left out.
-    pub(crate) const NOWHERE: Placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
+    pub(crate) const LEFT_OUT: Placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
 }
 
 /// One sweep as received.
@@ -66,7 +66,7 @@ pub enum Timing {
 
 impl Timing {
     /// Whether its times are finite and the sweep has a duration.
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         match *self {
             Timing::AtStamp => true,
             Timing::Offset { from_s, span_s } => from_s.is_finite() && is_span(span_s),

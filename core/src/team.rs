@@ -38,9 +38,9 @@ impl<T: Team> Workers for T {
 }
 
 /// A team of one thread.
-pub struct Alone;
+pub struct SingleThread;
 
-impl Team for Alone {
+impl Team for SingleThread {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         a();
         b();

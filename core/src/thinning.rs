@@ -94,7 +94,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn all_are_taken_where_there_is_room() {
+    fn everything_is_taken_if_it_fits() {
         for room in [7, 8, 1000] {
             let t = Thinning::new(7, room);
             assert!((0..7).all(|n| t.index(n) == n && t.rank(n) == Some(n)));

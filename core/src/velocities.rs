@@ -18,7 +18,7 @@ use core::ops::Range;
 use glam::DVec3;
 
 /// Maximum number of returns a thread processes in one piece: an eighth of an HDL-64E sweep.
-const RETURNS_LEAST: usize = 1 << 14;
+const PIECE_RETURNS_MAX: usize = 1 << 14;
 
 /// Record index of every column of the first sweep's window, [`NONE`] if it has none.
 pub(crate) struct FlowOfColumn([u32; COLUMNS_MAX]);
@@ -46,7 +46,7 @@ pub(crate) struct Found<'a> {
 
 impl Found<'_> {
     /// Writes a velocity for every solid column and every return of the first sweep.
-    pub fn put_out<'o>(
+    pub fn write_velocities<'o>(
         &self,
         team: &impl Team,
         points: &'o [Point],
@@ -220,7 +220,7 @@ impl Found<'_> {
                 *out = ReturnFlow::new(record.copied(), self.status(column, point, flow));
             }
         };
-        team::share(team, RETURNS_LEAST, 0..out.len(), out, 1, &part);
+        team::share(team, PIECE_RETURNS_MAX, 0..out.len(), out, 1, &part);
     }
 
     /// The status of a return, given the flow of its column.

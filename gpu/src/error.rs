@@ -36,13 +36,13 @@ pub enum GpuError {
         /// The function that reported it.
         call: &'static str,
         /// How far the program got.
-        during: During,
+        during: FailurePoint,
     },
     /// A run missed its deadline. Final, because the device may still be running it.
     #[error("{during} did not finish within {after:?}")]
     Timeout {
         /// How far the program got.
-        during: During,
+        during: FailurePoint,
         /// The deadline.
         after: Duration,
     },
@@ -54,7 +54,7 @@ pub enum GpuError {
     },
     /// The results of a program are impossible. Final.
     #[error("`{program}` left invalid results behind: {what}")]
-    Nonsense {
+    InvalidResults {
         /// The program's name.
         program: &'static str,
         /// What is impossible.
@@ -82,7 +82,7 @@ pub enum GpuError {
 
 /// How far a program got before it failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct During {
+pub struct FailurePoint {
     /// The program's name.
     pub program: &'static str,
     /// Index and name of the last step known to have finished. Also `None` if the device has no
@@ -90,7 +90,7 @@ pub struct During {
     pub last: Option<(usize, &'static str)>,
 }
 
-impl fmt::Display for During {
+impl fmt::Display for FailurePoint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.last {
             Some((index, name)) => {

@@ -3,10 +3,10 @@
 use crate::arena::{self, Slot};
 use crate::error::failed;
 use crate::instance::Instance;
-use crate::owner::{Census, Gpu, Ready};
+use crate::owner::{Census, Gpu, ReadyDevice};
 use crate::program::Pipelines;
 use crate::recorder::{Recorded, record};
-use crate::{Buffer, DeviceInfo, DeviceKind, During, GpuError, Heap, Options, Program};
+use crate::{Buffer, DeviceInfo, DeviceKind, FailurePoint, GpuError, Heap, Options, Program};
 use crate::{check, device};
 use ash::vk;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const GRACE: Duration = Duration::from_secs(1);
 /// Buffers and programs are named by their index in the tables given to [`Executor::new`]; an
 /// index out of range, or a buffer of the wrong heap, panics.
 pub struct Executor {
-    gpu: Ready,
+    gpu: ReadyDevice,
     slots: Vec<Slot>,
     programs: Vec<Recorded>,
     fence: vk::Fence,
@@ -66,7 +66,7 @@ impl Executor {
             .collect::<Result<_, _>>()?;
         Ok(Self {
             fence: gpu.fence()?,
-            gpu: Ready::new(gpu),
+            gpu: ReadyDevice::new(gpu),
             slots,
             programs: recorded,
             timeout: options.timeout,
@@ -119,7 +119,7 @@ impl Executor {
     /// `Timeout` after [`Options::timeout`], `DeviceLost`, `Vulkan`. Once one of them has been
     /// returned, every later run returns it again immediately.
     pub fn run(&mut self, program: usize) -> Result<(), GpuError> {
-        self.run_beside(program, || ())
+        self.run_alongside(program, || ())
     }
 
     /// Runs a program to completion, and `work` on this thread while the device is busy. The time
@@ -127,7 +127,7 @@ impl Executor {
     ///
     /// # Errors
     /// As [`Executor::run`]. `work` has not been done if the submission failed.
-    pub fn run_beside(&mut self, program: usize, work: impl FnOnce()) -> Result<(), GpuError> {
+    pub fn run_alongside(&mut self, program: usize, work: impl FnOnce()) -> Result<(), GpuError> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
         }
@@ -163,20 +163,20 @@ impl Executor {
         }
     }
 
-    fn during(&mut self, program: usize) -> During {
+    fn during(&mut self, program: usize) -> FailurePoint {
         let Recorded { name, timer, .. } = &mut self.programs[program];
         // Software drivers answer this query only when they are idle.
         let last = match self.gpu.info().kind {
             DeviceKind::Cpu => None,
             _ => timer.last_finished(&self.gpu),
         };
-        During { program: name, last }
+        FailurePoint { program: name, last }
     }
 
     /// Gives up on the device because the results of a program are impossible: from now on every
     /// run fails with the returned error.
     pub fn give_up(&mut self, program: usize, what: &'static str) -> GpuError {
-        let failure = GpuError::Nonsense { program: self.programs[program].name, what };
+        let failure = GpuError::InvalidResults { program: self.programs[program].name, what };
         self.failure = Some(failure.clone());
         failure
     }

@@ -11,9 +11,9 @@
 //!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host. They create, record
 //!   and update nothing on the device: that takes a mutable reference which only set-up has. What
 //!   a driver allocates inside a submit is outside this contract.
-//! - **Waiting.** `run` submits and waits, at most [`Options::timeout`]; [`Executor::run_beside`]
-//!   does the caller's work in between. Programs never overlap, so nothing needs ordering between
-//!   two runs.
+//! - **Waiting.** `run` submits and waits, at most [`Options::timeout`];
+//!   [`Executor::run_alongside`] does the caller's work in between. Programs never overlap, so
+//!   nothing needs ordering between two runs.
 //! - **Ordering.** Within a program there is a barrier exactly where declared accesses conflict
 //!   ([`Binding::reads`], [`Binding::writes`]): accesses that a kernel does not declare are not
 //!   ordered.
@@ -43,7 +43,7 @@ mod recorder;
 mod timer;
 
 pub use device::{DeviceInfo, DeviceKind, Limits, devices};
-pub use error::{During, GpuError};
+pub use error::{FailurePoint, GpuError};
 pub use executor::Executor;
 pub use order::{Access, accesses};
 pub use owner::Census;

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_barrier_stands_where_accesses_conflict_and_nowhere_else() {
+    fn barriers_are_placed_only_where_accesses_conflict() {
         let (r, w) = (vec![Access::read(0)], vec![Access::write(0)]);
         let elsewhere = vec![Access::write(1)];
         assert_eq!(barriers(&[r.clone(), r.clone()]), [false, false]);

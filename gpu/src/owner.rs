@@ -3,8 +3,8 @@
 //! Every create, allocate, record and update call of the crate goes through [`Gpu`], which counts
 //! what it creates and remembers what has to be destroyed: the census and the clean-up are complete
 //! because there is no other way to the device. All these calls take `&mut Gpu`, which is gone
-//! after set-up: from then on the executor has only shared access ([`Ready`]), so that code that
-//! creates something during a run does not compile.
+//! after set-up: from then on the executor has only shared access ([`ReadyDevice`]), so that code
+//! that creates something during a run does not compile.
 
 mod create;
 
@@ -143,9 +143,9 @@ impl Gpu {
 }
 
 /// A device whose set-up is over.
-pub(crate) struct Ready(ManuallyDrop<Gpu>);
+pub(crate) struct ReadyDevice(ManuallyDrop<Gpu>);
 
-impl Ready {
+impl ReadyDevice {
     pub fn new(gpu: Gpu) -> Self {
         Self(ManuallyDrop::new(gpu))
     }
@@ -160,7 +160,7 @@ impl Ready {
     }
 }
 
-impl Deref for Ready {
+impl Deref for ReadyDevice {
     type Target = Gpu;
 
     fn deref(&self) -> &Gpu {

@@ -34,7 +34,7 @@ pub(crate) fn record(
         let recorder = Recorder { device, commands, slots, pipelines };
         recorder.program(program, &barriers, timer.pool);
         if to_host {
-            recorder.hand_to_host();
+            recorder.make_visible_to_host();
         }
     })?;
     Ok(Recorded { name: program.name, commands, timer })
@@ -118,7 +118,7 @@ impl Recorder<'_> {
     }
 
     /// Makes writes visible through the host's mappings once the fence is signalled.
-    fn hand_to_host(&self) {
+    fn make_visible_to_host(&self) {
         let stages = Stage::TRANSFER | Stage::COMPUTE_SHADER;
         let written = Touch::TRANSFER_WRITE | Touch::SHADER_WRITE;
         self.memory_barrier(stages, written, Stage::HOST, Touch::HOST_READ);

@@ -68,7 +68,7 @@ fn work_that_panics_beside_the_device() {
     let Some(mut gpu) = executor(&Options::default(), &table, ops) else {
         return;
     };
-    let beside = || gpu.run_beside(0, || panic!("in the test"));
+    let beside = || gpu.run_alongside(0, || panic!("in the test"));
     assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(beside)).is_err());
     let abandoned = GpuError::Abandoned { program: "test" };
     assert_eq!(gpu.run(0), Err(abandoned.clone()));
@@ -150,7 +150,7 @@ fn movable(_: &impl Send) {}
 /// Two programs share buffers, and one finds what the other left. The only barriers are for the
 /// conflicts over the counter within the second program.
 #[test]
-fn contents_last_and_runs_make_nothing() {
+fn contents_persist_and_runs_allocate_nothing() {
     let count = kernel(
         "count",
         "

@@ -73,7 +73,7 @@ fn table() -> [raywake_gpu::Buffer; 5] {
 }
 
 /// Runs twice and returns the layer's messages.
-fn said(validation: Validation, ops: Vec<Op>) -> Vec<String> {
+fn messages(validation: Validation, ops: Vec<Op>) -> Vec<String> {
     let mut gpu = executor(&options(validation), &table(), ops).expect("there is a device");
     for _ in 0..2 {
         gpu.run(0).unwrap();
@@ -83,11 +83,11 @@ fn said(validation: Validation, ops: Vec<Op>) -> Vec<String> {
 }
 
 #[test]
-fn nothing_is_found_in_honest_programs() {
+fn correct_programs_have_no_findings() {
     for validation in [Validation::Sync, Validation::GpuAssisted] {
         if layer(validation) {
             let ops = everything(shift("copy", 0, &[READ, WRITE]));
-            assert_eq!(said(validation, ops), [""; 0], "{validation:?}");
+            assert_eq!(messages(validation, ops), [""; 0], "{validation:?}");
         }
     }
 }
@@ -98,8 +98,8 @@ fn an_undeclared_write_is_a_hazard() {
         let liar = shift("liar", 0, &[READ, READ]);
         let reader = shift("reader", 0, &[READ, WRITE]);
         let ops = vec![dispatch(liar, &[1, 2], 4), dispatch(reader, &[2, 3], 4)];
-        let said = said(Validation::Sync, ops);
-        assert!(said.iter().any(|text| text.contains("HAZARD")), "{said:?}");
+        let messages = messages(Validation::Sync, ops);
+        assert!(messages.iter().any(|text| text.contains("HAZARD")), "{messages:?}");
     }
 }
 
@@ -107,7 +107,7 @@ fn an_undeclared_write_is_a_hazard() {
 fn an_access_out_of_bounds_is_found() {
     if layer(Validation::GpuAssisted) {
         let beyond = shift("beyond", 1 << 20, &[READ, CHANGE]);
-        let said = said(Validation::GpuAssisted, vec![dispatch(beyond, &[1, 2], 4)]);
-        assert!(said.iter().any(|text| text.contains("out of bounds")), "{said:?}");
+        let messages = messages(Validation::GpuAssisted, vec![dispatch(beyond, &[1, 2], 4)]);
+        assert!(messages.iter().any(|text| text.contains("out of bounds")), "{messages:?}");
     }
 }

@@ -63,13 +63,13 @@ pub trait RecordingCommand: Clone + Debug {
     fn out(&self) -> Option<&Path>;
 
     /// Redirects the results.
-    fn set_out(&mut self, out: PathBuf);
+    fn set_output(&mut self, out: PathBuf);
 
     /// The option given, if any, that names a single file, which several recordings cannot share.
     fn single_file(&self) -> Option<&'static str>;
 
     /// Runs the command on one recording. Returns whether it ran to completion.
-    fn carry_out(&self) -> Result<bool, RunError>;
+    fn execute(&self) -> Result<bool, RunError>;
 }
 
 /// A recording, and where its results go below the output folder.
@@ -97,7 +97,7 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     let mut own = command.clone();
     let SharedArgs { recordings: Recordings { list, shard, .. }, quiet, .. } = own.shared();
     let (shard, quiet) = (*shard, *quiet);
-    let Some(list) = list else { return command.carry_out() };
+    let Some(list) = list else { return command.execute() };
     if let Some(option) = command.single_file() {
         let what = format!("--{option} is for a single recording and cannot be used with --list");
         return Err(Error::Usage(what).into());
@@ -174,7 +174,7 @@ impl Tally {
 fn command_for<C: RecordingCommand>(command: &C, at: &ListedRecording) -> C {
     let mut one = command.clone();
     let out = command.out().map(|out| out.join(&at.place));
-    out.into_iter().for_each(|out| one.set_out(out));
+    out.into_iter().for_each(|out| one.set_output(out));
     *one.shared().recordings = Recordings::one(at.data.clone());
     one
 }
@@ -185,15 +185,14 @@ fn finish(
     data: &Path,
     seal: &str,
 ) -> Result<Option<bool>, RunError> {
-    let Some(out) = command.out() else { return command.carry_out().map(Some) };
+    let Some(out) = command.out() else { return command.execute().map(Some) };
     let done = out.join(DONE);
     let seal = format!("{seal}, {}\n", inventory(data)?);
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }
-    let whole = inputs::spare("out", out, data)
-        .map_err(RunError::from)
-        .and_then(|()| command.carry_out())?;
+    let whole =
+        inputs::spare("out", out, data).map_err(RunError::from).and_then(|()| command.execute())?;
     if whole {
         atomic::write(&done, |to| to.write_all(seal.as_bytes()))?;
     }
@@ -204,7 +203,7 @@ fn finish(
 /// settings or weights are invalid.
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
-    plain.set_out(PathBuf::new());
+    plain.set_output(PathBuf::new());
     let SharedArgs { recordings, flow, quiet } = plain.shared();
     // Results are the same on each backend.
     (*recordings, flow.backend, *quiet) = (Recordings::default(), BackendChoice::default(), true);
@@ -326,7 +325,7 @@ mod tests {
             self.out.as_deref()
         }
 
-        fn set_out(&mut self, out: PathBuf) {
+        fn set_output(&mut self, out: PathBuf) {
             self.out = Some(out);
         }
 
@@ -334,7 +333,7 @@ mod tests {
             None
         }
 
-        fn carry_out(&self) -> Result<bool, RunError> {
+        fn execute(&self) -> Result<bool, RunError> {
             let out = self.out.clone().unwrap();
             fs::create_dir_all(&out).unwrap();
             fs::OpenOptions::new()
@@ -351,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn all_are_tried_and_none_twice() {
+    fn each_is_tried_exactly_once() {
         let folder = tempfile::tempdir().unwrap();
         let names = ["a", "b", "c", "d", "e"].map(|name| folder.path().join(name));
         names.iter().for_each(|name| fs::create_dir(name).unwrap());

@@ -43,7 +43,7 @@ pub fn drive(
 ) -> Result<Chosen, RunError> {
     let tables = weights.tables(profile)?;
     let wanted = wanted(choice)?;
-    memory::ask_for(budget::host_bytes(profile, wanted.device.is_none()))?;
+    memory::probe_memory(budget::host_bytes(profile, wanted.device.is_none()))?;
     let backend = match &wanted.device {
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
         None => Backend::scalar(profile, &tables),
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_old_mesa_is_told_by_its_driver() {
+    fn an_old_mesa_is_recognised_by_its_driver() {
         assert_eq!(old_mesa("llvmpipe Mesa 22.3.6 (LLVM 15.0.6)"), Some("22.3.6"));
         for driver in [
             "llvmpipe Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)",

@@ -57,7 +57,8 @@ pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<
         settings.profile.moves.moves_min = p;
         settings.profile.check().map_err(|_| Error::Usage("--moving must be 0 to 1".into()))?;
     }
-    let rule = |e: ProfileError| Error::Usage(format!("--set: `{}` must be {}", e.field, e.must));
+    let rule =
+        |e: ProfileError| Error::Usage(format!("--set: `{}` must be {}", e.field, e.requirement));
     settings.check().map_err(rule)?;
     Ok(settings)
 }
@@ -88,7 +89,7 @@ fn set(s: &mut Settings, to: &ParameterSetting) -> Result<(), String> {
             let place = group.map_or(String::new(), |g| format!(" in `{g}`"));
             format!("there is no parameter `{name}`{place} (see PARAMETERS.md)")
         }
-        AssignError::Must(must) => format!("`{name}` must be {must}"),
+        AssignError::WrongType(requirement) => format!("`{name}` must be {requirement}"),
     })
 }
 
@@ -103,7 +104,7 @@ fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Res
     });
     match found[..] {
         [] => Err(format!("there is no parameter `objects.{path}` (see PARAMETERS.md)")),
-        [(_, set)] => set.map_err(|must| format!("`{name}` must be {must}")),
+        [(_, set)] => set.map_err(|requirement| format!("`{name}` must be {requirement}")),
         [(a, _), (b, _), ..] => Err(format!("ambiguous: `{a}.{name}` or `{b}.{name}`?")),
     }
 }
@@ -152,7 +153,7 @@ fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, E
         }
     }
     let rule = |e: ProfileError| {
-        Error::input(path, format!("key `{}`", e.field), format!("must be {}", e.must))
+        Error::input(path, format!("key `{}`", e.field), format!("must be {}", e.requirement))
     };
     settings.check().map_err(rule)?;
     Ok(settings)

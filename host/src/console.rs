@@ -70,12 +70,12 @@ pub fn note<'a>(quiet: bool, notes: impl IntoIterator<Item = &'a String>) -> Res
 
 /// Waits until a viewer has connected, or a signal is received.
 pub fn await_viewer(quiet: bool, sink: Option<&BagSink>) -> Result<(), Error> {
-    let is_watched = || sink.is_none_or(BagSink::is_watched);
-    if !is_watched() {
+    let has_viewer = || sink.is_none_or(BagSink::has_viewer);
+    if !has_viewer() {
         listen();
         say(quiet, "waiting for Foxglove to connect\n")?;
     }
-    while !is_watched() && !interrupted() {
+    while !has_viewer() && !interrupted() {
         thread::sleep(VIEWER_POLL);
     }
     Ok(())

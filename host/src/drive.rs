@@ -4,7 +4,7 @@
 use raywake_alloc_guard::Sealed;
 use raywake_core::output::{ColumnFlow, Output, ReturnFlow, SweepOutput, TrackletState};
 use raywake_core::params::{Profile, SOLID_MAX};
-use raywake_core::perceive::{Machine, StageTimer};
+use raywake_core::perceive::{StageTimer, StepContext};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Rig, Sweep};
@@ -155,8 +155,8 @@ impl Drive {
     }
 
     /// Whether columns and returns are classified.
-    pub fn tells_classes(&self) -> bool {
-        self.active().pipeline.encoder.is_on()
+    pub fn has_classes(&self) -> bool {
+        self.active().pipeline.encoder.has_weights()
     }
 
     /// Tracklets after the last step.
@@ -210,7 +210,7 @@ fn step<'a>(
     timer: &mut (impl StageTimer + Send),
 ) -> Result<SweepOutput<'a>, RunError> {
     parts.step(|Parts { setup, pipeline, backend, team, columns, points }| {
-        let machine = Machine { backend, team, timer };
+        let machine = StepContext { backend, team, timer };
         Ok(pipeline.step(setup, machine, sweep, before, Output { columns, points })?)
     })
 }

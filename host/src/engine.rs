@@ -21,8 +21,8 @@ use crate::laps::{Laps, milliseconds};
 use crate::locate::Locator;
 use crate::outputs::{Outputs, RunFiles};
 use crate::report;
-use crate::session::{Visit, each_sweep};
-use crate::settings_file::Made;
+use crate::session::{Visit, for_each_sweep};
+use crate::settings_file::ResultSettings;
 use crate::statistics::Statistics;
 use crate::summary::{Facts, RunSummary};
 use crate::team;
@@ -75,7 +75,7 @@ pub fn execute<S: Source + ?Sized>(
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
     let root = plan.files.root.as_deref();
     let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
-    let made = Made {
+    let made = ResultSettings {
         command: "run",
         recording: source.overview(),
         first: plan.sweeps.start,
@@ -97,7 +97,7 @@ pub fn execute<S: Source + ?Sized>(
         statistics: Statistics::default(),
         tracklets: Vec::new(),
     };
-    let end = each_sweep(source, plan.sweeps.clone(), plan.quiet, |source, visit| {
+    let end = for_each_sweep(source, plan.sweeps.clone(), plan.quiet, |source, visit| {
         run.sweep(source, visit, observe)
     })?;
     let backend = run.drive.backend();

@@ -73,7 +73,7 @@ use error::RunError;
 ///
 /// # Errors
 /// The command line is invalid.
-pub fn carry_out(line: &ArgMatches) -> Result<u8, clap::Error> {
+pub fn run_command_line(line: &ArgMatches) -> Result<u8, clap::Error> {
     let command = Args::from_arg_matches(line)?.command;
     let run =
         || args::inputs::protect(line).map_err(RunError::from).and_then(|()| execute(command));

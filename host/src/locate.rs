@@ -9,7 +9,7 @@ use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::Rig;
 use raywake_io::source::{Source, SweepData};
 use raywake_registration::Odometry;
-use raywake_registration::odometry::Locating;
+use raywake_registration::odometry::PoseStatus;
 use serde::Serialize;
 
 use crate::console::bytes;
@@ -22,7 +22,7 @@ use crate::order_statistics::Spread;
 const CHECKED: u32 = 10;
 /// Distance from the vehicle at which poses and registration are compared, m, so that rotation
 /// counts too.
-const AWAY_M: f64 = 20.0;
+const LEVER_ARM_M: f64 = 20.0;
 /// Poses that disagree by more are replaced, m (root mean square of steps): three times the error
 /// that `pose_noise_m` assumes. Scan-matched poses of KITTI drives have 0.6 to 1.0 cm, those of a
 /// GNSS-aided inertial unit 2.5 cm or more.
@@ -58,7 +58,8 @@ pub struct Locator {
     times_ms: Vec<f64>,
 }
 
-/// Differences of steps between poses and registration: along, across, and by rotation at `AWAY_M`.
+/// Differences of steps between poses and registration: along, across, and by rotation at
+/// `LEVER_ARM_M`.
 #[derive(Clone, Copy, Default)]
 struct Compared {
     count: u32,
@@ -71,7 +72,7 @@ struct Compared {
 impl Compared {
     fn add(&mut self, step: &Pose, given: &Pose) {
         let apart = (step.inverse() * *given).twist(1.0);
-        let apart = apart.linear.truncate().extend(AWAY_M * apart.angular.z);
+        let apart = apart.linear.truncate().extend(LEVER_ARM_M * apart.angular.z);
         self.count += 1;
         self.sum += apart;
         self.squares += apart.length_squared();
@@ -114,7 +115,7 @@ pub struct LocatedSweeps {
 /// # Errors
 /// [`RunError::NoMemory`].
 pub fn registration() -> Result<Sealed<Box<Odometry>>, RunError> {
-    memory::ask_for(Locator::BYTES)?;
+    memory::probe_memory(Locator::BYTES)?;
     let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     Ok(Sealed::new("registration", odometry))
 }
@@ -169,16 +170,16 @@ impl Locator {
             expected.into_iter().for_each(|twist| odometry.expect(twist));
             Ok::<_, RunError>(odometry.locate(stamp_s, points, rig))
         })?;
-        self.counts[found.locating as usize] += 1;
+        self.counts[found.pose_status as usize] += 1;
         let step = self.last[1].inverse() * found.world_from_vehicle;
         match self.poses {
             PoseUse::Find => place(sweep, found.world_from_vehicle, found.twist),
             PoseUse::Replace => place(sweep, self.last[0] * step, found.twist),
-            PoseUse::Check => match found.locating {
-                Locating::Registered => self.compare(sweep, &step),
-                Locating::Start => {}
+            PoseUse::Check => match found.pose_status {
+                PoseStatus::Registered => self.compare(sweep, &step),
+                PoseStatus::Start => {}
                 // Uncertain registration cannot judge poses.
-                Locating::Degenerate | Locating::Lost => self.poses = PoseUse::Keep,
+                PoseStatus::Degenerate | PoseStatus::Lost => self.poses = PoseUse::Keep,
             },
             PoseUse::Keep => {}
         }
@@ -198,13 +199,13 @@ impl Locator {
 
     /// Returns how sweeps were located so far.
     pub fn located(&self) -> LocatedSweeps {
-        let count = |locating: Locating| self.counts[locating as usize];
+        let count = |pose_status: PoseStatus| self.counts[pose_status as usize];
         LocatedSweeps {
             disagreement_m: self.compared.rms_m(),
             poses: self.poses,
-            registered: count(Locating::Registered),
-            degenerate: count(Locating::Degenerate),
-            lost: count(Locating::Lost),
+            registered: count(PoseStatus::Registered),
+            degenerate: count(PoseStatus::Degenerate),
+            lost: count(PoseStatus::Lost),
             ms: self.times_ms.get(1..).and_then(Spread::of),
         }
     }
@@ -239,7 +240,7 @@ impl LocatedSweeps {
         let centimetres = 100.0 * self.disagreement_m.unwrap_or(0.0);
         format!(
             "poses: the first steps by poses and by registration differ by {centimetres:.1} cm at \
-             {AWAY_M:.0} m, "
+             {LEVER_ARM_M:.0} m, "
         )
     }
 

@@ -28,7 +28,7 @@ fn explain(e: &clap::Error) -> ! {
 
 /// Reports a panic in a decoder as a damaged file, and exits if panics do not unwind.
 #[cfg(any(feature = "arrow", feature = "mcap"))]
-fn tell_of_damaged_files() {
+fn report_damaged_files() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| match raywake_io::source::decoder::damaged() {
         Some(e) if cfg!(panic = "abort") => {
@@ -45,9 +45,9 @@ static ALLOCATOR: Guard<System> = Guard(System);
 
 fn main() -> ExitCode {
     #[cfg(any(feature = "arrow", feature = "mcap"))]
-    tell_of_damaged_files();
+    report_damaged_files();
     #[cfg(unix)]
     raywake::console::survive_file_limits();
     let args = Args::command().try_get_matches().unwrap_or_else(|e| explain(&e));
-    ExitCode::from(raywake::carry_out(&args).unwrap_or_else(|e| explain(&e)))
+    ExitCode::from(raywake::run_command_line(&args).unwrap_or_else(|e| explain(&e)))
 }

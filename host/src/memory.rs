@@ -7,7 +7,7 @@ use crate::error::RunError;
 ///
 /// # Errors
 /// [`RunError::NoMemory`].
-pub fn ask_for(bytes: u64) -> Result<(), RunError> {
+pub fn probe_memory(bytes: u64) -> Result<(), RunError> {
     let mut room = Vec::<u8>::new();
     let given = room.try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
     // Otherwise the compiler may remove the unused allocation.

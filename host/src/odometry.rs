@@ -8,7 +8,7 @@ use raywake_io::source::{self, Unlocated, pose_row};
 use crate::args;
 use crate::console::{note, say};
 use crate::error::RunError;
-use crate::session::each_sweep;
+use crate::session::for_each_sweep;
 
 /// Locates all sweeps and writes their poses. Returns whether it ran to completion: a signal ends
 /// it after the current sweep, and the poses so far are written.
@@ -19,7 +19,7 @@ pub fn odometry(args: &args::OdometryArgs) -> Result<bool, RunError> {
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes())?;
     let mut poses = Vec::with_capacity(sweeps.len());
-    let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
+    let end = for_each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         poses.push(visit.now.world_from_vehicle);
         Ok(())
     })?;

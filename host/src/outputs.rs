@@ -101,10 +101,10 @@ impl Kinds {
     /// Creates the folders. Fails if this build lacks a feature that the files need.
     fn tables(&self, root: &Path) -> Result<Option<FlowTables>, Error> {
         if !cfg!(feature = "arrow") && (self.columns || self.points || self.argoverse) {
-            return Err(Error::lacking("--out", "arrow"));
+            return Err(Error::missing_feature("--out", "arrow"));
         }
         if self.parquet && !cfg!(feature = "parquet") {
-            return Err(Error::lacking("--parquet", "parquet"));
+            return Err(Error::missing_feature("--parquet", "parquet"));
         }
         atomic::create_folder(root)?;
         if self.argoverse {
@@ -149,7 +149,7 @@ impl Outputs {
         if let Some(bag) = &mut self.bag {
             bag.pair(first, flows)?;
         }
-        if self.pictures.are_wanted() {
+        if self.pictures.are_enabled() {
             let (columns, profile, frame) = (flows.columns, &self.profile, self.kinds.frame);
             let moving = flows.points.iter().filter(|p| p.status == Status::Moving).count();
             let figures = [("moving returns", moving as f64), ("ms per sweep", ms)];

@@ -45,7 +45,7 @@ impl RecordingCommand for args::RunArgs {
         self.results.out.as_deref()
     }
 
-    fn set_out(&mut self, out: PathBuf) {
+    fn set_output(&mut self, out: PathBuf) {
         self.results.out = Some(out);
     }
 
@@ -53,7 +53,7 @@ impl RecordingCommand for args::RunArgs {
         self.results.single_file()
     }
 
-    fn carry_out(&self) -> Result<bool, RunError> {
+    fn execute(&self) -> Result<bool, RunError> {
         Ok(!run(self)?.facts.interrupted)
     }
 }

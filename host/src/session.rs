@@ -37,7 +37,7 @@ pub struct SessionEnd {
 /// # Errors
 /// The first error of the source or `visit`; [`RunError::Allocation`] and [`RunError::NoMemory`]
 /// from registration.
-pub fn each_sweep<S: Source + ?Sized>(
+pub fn for_each_sweep<S: Source + ?Sized>(
     source: &mut S,
     sweeps: Range<usize>,
     quiet: bool,

@@ -18,10 +18,10 @@ use raywake_objects::params::TrackingParams;
 /// Name of the file.
 pub const NAME: &str = "settings.toml";
 /// Maximum number of differences listed in an error.
-const LINES_TOLD: usize = 3;
+const DIFFERENCES_LISTED_MAX: usize = 3;
 
 /// What results are made with.
-pub struct Made<'a> {
+pub struct ResultSettings<'a> {
     /// The command that makes them.
     pub command: &'static str,
     /// The recording.
@@ -36,7 +36,7 @@ pub struct Made<'a> {
     pub weights: &'a str,
 }
 
-impl Made<'_> {
+impl ResultSettings<'_> {
     /// Writes the file into the output folder, if there is one, and keeps other processes from
     /// writing there while the returned value lives.
     ///
@@ -58,7 +58,7 @@ impl Made<'_> {
     }
 
     fn text(&self) -> String {
-        let Made { command, recording, first, profile, objects, weights } = self;
+        let ResultSettings { command, recording, first, profile, objects, weights } = self;
         let Overview { name, rig, frames, .. } = recording;
         let poses = if recording.track.poses.is_empty() { "none" } else { "of the recording" };
         let own = rig.own_vehicle.map_or("none".into(), |own| format!("{own:?} m"));
@@ -90,12 +90,12 @@ impl Made<'_> {
 /// The error that a folder has other results, with the first differing lines.
 fn different(root: &Path, there: &str, here: &str) -> Error {
     let lines = there.lines().zip(here.lines());
-    let told = lines.filter(|(a, b)| a != b).take(LINES_TOLD);
-    let told: Vec<String> = told.map(|(a, b)| format!("`{a}`, not `{b}`")).collect();
+    let listed = lines.filter(|(a, b)| a != b).take(DIFFERENCES_LISTED_MAX);
+    let listed: Vec<String> = listed.map(|(a, b)| format!("`{a}`, not `{b}`")).collect();
     Error::Usage(format!(
         "{} holds other results: its {NAME} has {}; choose another folder, or delete this one",
         root.display(),
-        told.join(", ")
+        listed.join(", ")
     ))
 }
 
@@ -146,14 +146,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_sets_the_same() {
+    fn written_settings_round_trip() {
         let (folder, recording) = (tempfile::tempdir().unwrap(), recording());
         let mut objects = TrackingParams::DEFAULT;
         objects.front_end.link_m = 0.1 + 0.2;
         for profile in &Profile::shipped() {
             let root = folder.path().join(profile.name.as_str());
             let (objects, weights) = (Some(&objects), "0");
-            let made = Made {
+            let made = ResultSettings {
                 command: "track",
                 recording: &recording,
                 first: 0,
@@ -173,7 +173,7 @@ mod tests {
         let (folder, recording) = (tempfile::tempdir().unwrap(), recording());
         let profile = &Profile::hdl64();
         let made = |first, weights| {
-            let made = Made {
+            let made = ResultSettings {
                 command: "run",
                 recording: &recording,
                 first,

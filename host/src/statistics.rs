@@ -35,13 +35,13 @@ pub struct ResetAt {
 
 impl ResetAt {
     fn new(sweep: usize, frame: u64, reset: Reset) -> ResetAt {
-        let (reason, text) = in_words(reset);
+        let (reason, text) = describe_reset(reset);
         ResetAt { sweep, frame, reason, text }
     }
 }
 
 /// Returns a key for a reset, and its reason in words.
-pub fn in_words(reset: Reset) -> (&'static str, String) {
+pub fn describe_reset(reset: Reset) -> (&'static str, String) {
     match reset {
         Reset::First => ("first", "first sweep".to_string()),
         Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the previous sweep")),
@@ -195,7 +195,7 @@ impl Statistics {
     }
 
     /// Returns the share of pairs within [`BUDGET_MS`]; `None` without pairs.
-    pub fn share_in_time(&self) -> Option<f64> {
+    pub fn share_within_budget(&self) -> Option<f64> {
         let within = self.totals.iter().filter(|ms| **ms < BUDGET_MS).count();
         (!self.totals.is_empty()).then(|| within as f64 / self.totals.len() as f64)
     }

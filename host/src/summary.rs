@@ -135,7 +135,7 @@ impl RunSummary {
             distinct_rays: per(s.rays, s.sweeps),
             stage_ms: Ordered(spreads.collect()),
             total_ms: Spread::of(&s.totals),
-            share_under_100_ms: s.share_in_time(),
+            share_under_100_ms: s.share_within_budget(),
             read_ms: s.read_ms / s.sweeps.max(1) as f64,
             write_ms: s.write_ms / s.sweeps.max(1) as f64,
             dropped: s.dropped,

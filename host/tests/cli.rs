@@ -201,7 +201,7 @@ fn gaps_and_jumps() {
 
 /// The vehicle does not take on the speed of a jump, neither in that sweep nor in the next pair.
 #[test]
-fn after_a_jump_all_is_as_before() {
+fn results_recover_after_a_jump() {
     let t = Temp::new();
     t.drive(9);
     let figures = |t: &Temp| {
@@ -328,7 +328,7 @@ fn completions_and_manual_pages() {
 }
 
 #[test]
-fn a_run_for_nothing_says_so() {
+fn a_run_without_outputs_says_so() {
     let t = Temp::new();
     t.drive(2);
     let says = "no output, only timings";

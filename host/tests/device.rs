@@ -132,7 +132,7 @@ fn tables(out: &Path, from: usize) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn in_a_run_the_scalar_backend_goes_on() {
+fn the_scalar_backend_takes_over_during_a_run() {
     let Some(t) = drive() else { return };
     let json = t.path().join("s.json");
     let results = |name: &str, fault: &str, from: usize| {

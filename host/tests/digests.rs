@@ -63,18 +63,18 @@ fn pose(sweep: &SimSweep, away: f64) -> String {
 
 /// How to run.
 #[derive(Clone, Copy, Debug)]
-enum Way {
+enum RunMode {
     Scalar,
     /// Vulkan. If the device is a CPU: its vector width and number of threads.
     Vulkan(u32, Option<u32>),
 }
 
-impl Way {
+impl RunMode {
     /// The command of a program, run this way.
     fn command(self, program: &Path, what: &str, data: &Path) -> Command {
         let mut command = Command::new(program);
         command.arg(what).arg(data);
-        let Way::Vulkan(width, threads) = self else {
+        let RunMode::Vulkan(width, threads) = self else {
             command.args(["--backend", "scalar"]);
             return command;
         };
@@ -110,17 +110,17 @@ fn vulkan(program: &Path) -> bool {
 }
 
 /// The digest of `run`, whose summary is checked.
-fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
+fn digest(t: &Temp, program: &Path, mode: RunMode, more: &[&str]) -> String {
     let file = t.path().join("summary.json");
-    let mut command = way.command(program, "run", &t.path().join("drive"));
+    let mut command = mode.command(program, "run", &t.path().join("drive"));
     command.args(["--quiet", "--no-points", "--summary"]).arg(&file).args(more);
     let outcome = Outcome::of(command.output().unwrap());
     outcome.succeeded();
     let s = outcome.summary(&file);
     let number = |key: &str| s[key].as_u64().unwrap_or_else(|| panic!("{key} in {s}"));
-    let on_device = matches!(way, Way::Vulkan(..));
+    let on_device = matches!(mode, RunMode::Vulkan(..));
     assert_eq!(s["backend"], if on_device { "vulkan" } else { "scalar" });
-    if let (Way::Vulkan(width, _), Some(device)) = (way, s["device"].as_str()) {
+    if let (RunMode::Vulkan(width, _), Some(device)) = (mode, s["device"].as_str()) {
         let told = !device.starts_with("llvmpipe") || device.contains(&format!("{width} bits"));
         assert!(told, "{device} for {width} bits");
     }
@@ -135,7 +135,7 @@ fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
 fn table(t: &Temp, program: &Path) -> Option<Vec<u8>> {
     let out = t.path().join("tables");
     let _ = fs::remove_dir_all(&out);
-    let mut command = Way::Scalar.command(program, "run", &t.path().join("drive"));
+    let mut command = RunMode::Scalar.command(program, "run", &t.path().join("drive"));
     let outcome = Outcome::of(command.args(["--quiet", "--out"]).arg(&out).output().unwrap());
     if outcome.stderr.contains("needs the feature `arrow`") {
         return None;
@@ -145,8 +145,8 @@ fn table(t: &Temp, program: &Path) -> Option<Vec<u8>> {
 }
 
 /// The digest that `map` prints.
-fn map_digest(t: &Temp, way: Way) -> String {
-    let mut command = way.command(own(), "map", &t.path().join("drive"));
+fn map_digest(t: &Temp, mode: RunMode) -> String {
+    let mut command = mode.command(own(), "map", &t.path().join("drive"));
     command.arg("--out").arg(t.path().join("map")).args(["-n", "2"]);
     let outcome = Outcome::of(command.output().unwrap());
     outcome.succeeded();
@@ -155,9 +155,9 @@ fn map_digest(t: &Temp, way: Way) -> String {
 }
 
 /// The digest of `track`, whose summary is checked.
-fn track_digest(t: &Temp, program: &Path, way: Way, front_end: &str) -> String {
+fn track_digest(t: &Temp, program: &Path, mode: RunMode, front_end: &str) -> String {
     let file = t.path().join("tracks.json");
-    let mut command = way.command(program, "track", &t.path().join("drive"));
+    let mut command = mode.command(program, "track", &t.path().join("drive"));
     command.args(["--quiet", "--fixed-lag", "--front-end", front_end, "--summary"]).arg(&file);
     let outcome = Outcome::of(command.output().unwrap());
     outcome.succeeded();
@@ -172,11 +172,11 @@ fn tracks() {
     let t = Temp::new();
     drive(&t);
     let [variance, flow] =
-        ["variance", "flow"].map(|kind| track_digest(&t, own(), Way::Scalar, kind));
+        ["variance", "flow"].map(|kind| track_digest(&t, own(), RunMode::Scalar, kind));
     assert_ne!(variance, flow, "the flow does something");
-    assert_eq!(track_digest(&t, own(), Way::Scalar, "variance"), variance, "again");
+    assert_eq!(track_digest(&t, own(), RunMode::Scalar, "variance"), variance, "again");
     if vulkan(own()) {
-        assert_eq!(track_digest(&t, own(), Way::Vulkan(THREADS_AT, None), "flow"), flow);
+        assert_eq!(track_digest(&t, own(), RunMode::Vulkan(THREADS_AT, None), "flow"), flow);
     }
 }
 
@@ -184,26 +184,26 @@ fn tracks() {
 fn widths_and_threads() {
     let t = Temp::new();
     drive(&t);
-    let scalar = digest(&t, own(), Way::Scalar, &[]);
-    assert_eq!(digest(&t, own(), Way::Scalar, &[]), scalar, "scalar again");
+    let scalar = digest(&t, own(), RunMode::Scalar, &[]);
+    assert_eq!(digest(&t, own(), RunMode::Scalar, &[]), scalar, "scalar again");
     if !vulkan(own()) {
         return;
     }
-    let widths = WIDTHS.map(|width| Way::Vulkan(width, None));
-    let threads = THREADS.map(|n| Way::Vulkan(THREADS_AT, Some(n)));
-    for way in widths.into_iter().chain(threads) {
-        assert_eq!(digest(&t, own(), way, &[]), scalar, "{way:?}");
+    let widths = WIDTHS.map(|width| RunMode::Vulkan(width, None));
+    let threads = THREADS.map(|n| RunMode::Vulkan(THREADS_AT, Some(n)));
+    for mode in widths.into_iter().chain(threads) {
+        assert_eq!(digest(&t, own(), mode, &[]), scalar, "{mode:?}");
     }
 }
 
 #[test]
-fn wherever_the_origin_of_the_world_lies() {
+fn independent_of_the_world_origin() {
     let t = Temp::new();
     drive(&t);
     for profile in ["hdl64", "dissertation"] {
         let found = [0.0, 1e5, -1e6].map(|away| {
             t.write("drive/poses.txt", rows(&|sweep| pose(sweep, away)));
-            digest(&t, own(), Way::Scalar, &["--profile", profile])
+            digest(&t, own(), RunMode::Scalar, &["--profile", profile])
         });
         assert!(found.iter().all(|digest| *digest == found[0]), "{profile}: {found:?}");
     }
@@ -214,7 +214,7 @@ fn instruction_sets() {
     let t = Temp::new();
     drive(&t);
     let run = |more: &[&str]| {
-        let found = digest(&t, own(), Way::Scalar, more);
+        let found = digest(&t, own(), RunMode::Scalar, more);
         let summary = std::fs::read(t.path().join("summary.json")).unwrap();
         let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
         (found, summary["simd"].clone())
@@ -225,7 +225,7 @@ fn instruction_sets() {
         let (found, told) = run(&["--simd", simd.name()]);
         assert_eq!((found, told), (wanted.clone(), simd.name().into()));
     }
-    let mut command = Way::Scalar.command(own(), "run", &t.path().join("drive"));
+    let mut command = RunMode::Scalar.command(own(), "run", &t.path().join("drive"));
     let refused = Outcome::of(command.args(["--simd", "avx3"]).output().unwrap());
     assert!(refused.stderr.contains(Simd::BASELINE.name()), "{}", refused.stderr);
 }
@@ -235,10 +235,10 @@ fn without_the_filter() {
     let t = Temp::new();
     drive(&t);
     let none = ["--filter", "none"];
-    let scalar = digest(&t, own(), Way::Scalar, &none);
-    assert_ne!(digest(&t, own(), Way::Scalar, &[]), scalar, "the filter does something");
+    let scalar = digest(&t, own(), RunMode::Scalar, &none);
+    assert_ne!(digest(&t, own(), RunMode::Scalar, &[]), scalar, "the filter does something");
     if vulkan(own()) {
-        assert_eq!(digest(&t, own(), Way::Vulkan(THREADS_AT, None), &none), scalar);
+        assert_eq!(digest(&t, own(), RunMode::Vulkan(THREADS_AT, None), &none), scalar);
     }
 }
 
@@ -246,10 +246,10 @@ fn without_the_filter() {
 fn maps() {
     let t = Temp::new();
     drive(&t);
-    let scalar = map_digest(&t, Way::Scalar);
-    assert_eq!(map_digest(&t, Way::Scalar), scalar, "scalar again");
+    let scalar = map_digest(&t, RunMode::Scalar);
+    assert_eq!(map_digest(&t, RunMode::Scalar), scalar, "scalar again");
     if vulkan(own()) {
-        assert_eq!(map_digest(&t, Way::Vulkan(THREADS_AT, None)), scalar);
+        assert_eq!(map_digest(&t, RunMode::Vulkan(THREADS_AT, None)), scalar);
     }
 }
 
@@ -258,22 +258,22 @@ fn other_builds() {
     let Some(programs) = env::var_os("RAYWAKE_DIGEST_OF") else { return };
     let t = Temp::new();
     drive(&t);
-    let wanted = digest(&t, own(), Way::Scalar, &[]);
-    let tracks = track_digest(&t, own(), Way::Scalar, "flow");
+    let wanted = digest(&t, own(), RunMode::Scalar, &[]);
+    let tracks = track_digest(&t, own(), RunMode::Scalar, "flow");
     let table = table(&t, own()).expect("tests are built with tables");
     let mut written = 0;
     for program in env::split_paths(&programs).filter(|p| !p.as_os_str().is_empty()) {
         let name = program.display();
-        assert_eq!(digest(&t, &program, Way::Scalar, &[]), wanted, "{name}, scalar");
-        let found = track_digest(&t, &program, Way::Scalar, "flow");
+        assert_eq!(digest(&t, &program, RunMode::Scalar, &[]), wanted, "{name}, scalar");
+        let found = track_digest(&t, &program, RunMode::Scalar, "flow");
         assert_eq!(found, tracks, "{name}, tracks");
         if let Some(found) = self::table(&t, &program) {
             assert!(found == table, "{name}, tables");
             written += 1;
         }
         if vulkan(&program) {
-            let way = Way::Vulkan(THREADS_AT, None);
-            assert_eq!(digest(&t, &program, way, &[]), wanted, "{name}, {way:?}");
+            let mode = RunMode::Vulkan(THREADS_AT, None);
+            assert_eq!(digest(&t, &program, mode, &[]), wanted, "{name}, {mode:?}");
         }
     }
     assert!(written > 0, "none of them writes tables");
@@ -288,11 +288,11 @@ fn a_recorded_drive() {
     let t = Temp::new();
     for more in [&[][..], &["--filter", "none"]] {
         let mut digests = Vec::new();
-        let mut ways = vec![Way::Scalar];
-        ways.extend(vulkan(own()).then_some(Way::Vulkan(THREADS_AT, None)));
-        for way in ways {
+        let mut modes = vec![RunMode::Scalar];
+        modes.extend(vulkan(own()).then_some(RunMode::Vulkan(THREADS_AT, None)));
+        for mode in modes {
             let file = t.path().join("summary.json");
-            let mut command = way.command(own(), "run", &data);
+            let mut command = mode.command(own(), "run", &data);
             command.args(["--quiet", "--summary"]).arg(&file).args(more);
             let outcome = Outcome::of(command.output().unwrap());
             outcome.succeeded();

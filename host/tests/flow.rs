@@ -90,7 +90,7 @@ fn printed(o: &Outcome) -> Pose {
 }
 
 #[test]
-fn a_vehicle_that_moves_and_a_car_that_comes() {
+fn a_moving_vehicle_and_an_oncoming_car() {
     let t = Temp::new();
     let ([first, second], car) = sweeps();
     let cloud = first_cloud();
@@ -161,7 +161,7 @@ fn far_apart_and_turned() {
 }
 
 #[test]
-fn what_is_known_beforehand() {
+fn known_motion_is_used() {
     let t = Temp::new();
     let [first, second] = &sweeps().0;
     let (a, b) =
@@ -187,7 +187,7 @@ fn what_is_known_beforehand() {
 }
 
 #[test]
-fn clouds_that_tell_nothing() {
+fn uninformative_clouds() {
     let t = Temp::new();
     let good = t.write("good.bin", bin(&positions(&sweeps().0[0])));
     let out = t.path().join("flow.bin");
@@ -230,7 +230,7 @@ fn ply(cloud: &[[f32; 3]]) -> Vec<u8> {
 }
 
 #[test]
-fn files_that_are_none() {
+fn invalid_files() {
     let t = Temp::new();
     let cloud = bin(&positions(&sweeps().0[0]));
     let good = t.write("good.bin", &cloud);

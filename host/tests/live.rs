@@ -63,7 +63,7 @@ fn count(summary: &Value, group: &str, name: &str) -> u64 {
 }
 
 /// Asserts that every packet and every sweep is accounted for, and nothing was allocated.
-fn accounted(summary: &Value) {
+fn assert_accounted(summary: &Value) {
     assert_eq!(count(summary, "sweeps", "allocating"), 0, "{summary}");
     // A busy system that allows only small buffers drops some, and reports them.
     let lost = summary["overflowed"].as_u64().unwrap_or(0);
@@ -94,7 +94,7 @@ fn received(socket: &UdpSocket) -> [u64; 4] {
 
 /// A live replay gives the same bits as the capture. Messages are recorded, datagrams sent.
 #[test]
-fn a_replay_has_the_digest_of_the_capture() {
+fn replay_and_capture_have_the_same_digest() {
     let t = Temp::new();
     let (path, mcap) = (recorded(&t), t.path().join("street.mcap"));
     let (socket, address) = socket();
@@ -107,7 +107,7 @@ fn a_replay_has_the_digest_of_the_capture() {
     });
     let to = ["--objects", "--mcap", mcap.to_str().unwrap(), "--send", &address];
     let (o, s) = replayed(&t, &[&BACKEND[..], &to].concat());
-    accounted(&s);
+    assert_accounted(&s);
     assert!(o.stdout.contains("simulated OS1-128 at 127.0.0.1:"), "{}", o.stdout);
     let [sweeps, columns, tracklets, objects] = listening.join().unwrap();
     let (done, pairs) = (count(&s, "sweeps", "done"), count(&s, "sweeps", "pairs"));
@@ -140,7 +140,7 @@ fn a_replay_has_the_digest_of_the_capture() {
 /// With all cores busy, and at ten times the speed, the queue stays bounded and everything is
 /// counted.
 #[test]
-fn more_than_it_can_do() {
+fn overload() {
     let t = Temp::new();
     recorded(&t);
     let busy: Vec<Child> = (0..thread::available_parallelism().map_or(1, usize::from))
@@ -151,14 +151,14 @@ fn more_than_it_can_do() {
         child.kill().unwrap();
         child.wait().unwrap();
     }
-    accounted(&s);
+    assert_accounted(&s);
     assert!(count(&s, "sweeps", "left_out") + count(&s, "sweeps", "before_start") > 0, "{s}");
     assert!(count(&s, "sweeps", "done") > 0 && s["deadline_ms"] == 5.0);
 }
 
 /// Poses received as datagrams, before the sweeps of their times.
 #[test]
-fn poses_that_come() {
+fn arriving_poses() {
     let t = Temp::new();
     recorded(&t);
     let place = |s: f64| [2.0 * s, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
@@ -184,7 +184,7 @@ fn poses_that_come() {
     });
     let (_, s) = replayed(&t, &[&BACKEND[..], &["--poses-from", &address]].concat());
     sending.join().unwrap();
-    accounted(&s);
+    assert_accounted(&s);
     assert_eq!(s["located"]["registered"], 0);
     let done = count(&s, "sweeps", "done");
     assert_eq!(count(&s, "located", "by_poses"), done);
@@ -213,7 +213,7 @@ fn a_device_that_fails() {
         let s = o.summary(&t.path().join("s.json"));
         assert!(s["device_failure"].as_str().unwrap().contains(told), "{s}");
         assert_eq!(s["backend"], "vulkan");
-        accounted(&s);
+        assert_accounted(&s);
     }
 }
 
@@ -234,7 +234,7 @@ fn a_full_disk() {
     let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
     o.failed(4, &["street.mcap", "recording stopped"]);
     let s = o.summary(&t.path().join("s.json"));
-    accounted(&s);
+    assert_accounted(&s);
     assert!(s["recording_failure"].as_str().is_some() && !mcap.exists());
     assert!(!fs::read_dir(t.path()).unwrap().any(|e| is_partial(&e.unwrap().path())));
 }
@@ -245,7 +245,7 @@ fn is_partial(path: &Path) -> bool {
 
 /// Foreign datagrams, and a signal: an orderly end, before and after the first sweep.
 #[test]
-fn a_signal_ends_it() {
+fn a_signal_stops_it() {
     let t = Temp::new();
     let (free, address) = socket();
     drop(free);
@@ -362,7 +362,7 @@ fn vlp16(n: u32) -> Vec<u8> {
 }
 
 #[test]
-fn what_does_not_fit_together() {
+fn conflicting_arguments() {
     let t = Temp::new();
     let wrong = |more: &[&str], code: i32, words: &[&str]| {
         let mut command = live(&t, more);

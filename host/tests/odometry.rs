@@ -28,7 +28,7 @@ fn digest(o: &Outcome) -> String {
 }
 
 #[test]
-fn poses_are_found_and_of_use() {
+fn poses_are_found_and_useful() {
     let t = Temp::new();
     let truth = recording(&t, SWEEPS)[SWEEPS - 1];
     let [clouds, poses] = ["clouds", "poses.txt"].map(|n| t.path().join(n).display().to_string());
@@ -58,7 +58,7 @@ fn poses_are_found_and_of_use() {
 
 /// Poses that alternate by 3 cm are replaced; those that slip are not.
 #[test]
-fn poses_that_are_given() {
+fn given_poses() {
     let t = Temp::new();
     let truth = recording(&t, 14);
     let run = |name: &str, off_m: &dyn Fn(usize) -> f64, more: &[&str]| {
@@ -90,7 +90,7 @@ fn poses_that_are_given() {
 }
 
 #[test]
-fn what_cannot_be() {
+fn unusable_arguments() {
     let t = Temp::new();
     recording(&t, 1);
     let [clouds, absent] = ["clouds", "absent"].map(|n| t.path().join(n).display().to_string());

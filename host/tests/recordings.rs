@@ -11,7 +11,7 @@ const BACKEND: [&str; 2] = ["--backend", "scalar"];
 
 #[test]
 #[cfg(feature = "mcap")]
-fn what_is_written_as_mcap_can_be_read() {
+fn mcap_is_read_back() {
     let t = Temp::new();
     t.drive(4);
     let [drive, mcap] = ["drive", "flow.mcap"].map(|name| t.path().join(name));
@@ -78,7 +78,7 @@ fn a_recording_is_cleaned() {
 /// What is left of a bag is a bag, in time order; other clouds leave clouds of the same format.
 #[test]
 #[cfg(feature = "mcap")]
-fn what_is_clean_is_stored_as_it_came() {
+fn clean_input_is_stored_unchanged() {
     let t = Temp::new();
     t.drive(4);
     let [drive, mcap, out] = ["drive", "flow.mcap", "clean"].map(|name| t.path().join(name));
@@ -116,7 +116,7 @@ fn what_is_clean_is_stored_as_it_came() {
 }
 
 #[test]
-fn a_recording_without_a_command_is_told_one() {
+fn a_command_is_suggested_for_a_bare_recording() {
     let t = Temp::new();
     t.drive(2);
     let drive = t.path().join("drive");

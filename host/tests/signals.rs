@@ -16,7 +16,7 @@ use common::{BACKEND, Outcome, SMALL, Temp, run};
 /// Linux only, where the shell can limit memory.
 #[cfg(target_os = "linux")]
 #[test]
-fn too_little_memory_is_told_before_the_first_sweep() {
+fn too_little_memory_is_reported_before_the_first_sweep() {
     let t = Temp::new();
     t.drive(2);
     let program = env!("CARGO_BIN_EXE_raywake");

@@ -4,7 +4,7 @@
 //! ratio, pair by pair, carries over to other machines; the times hold for this machine at that
 //! moment.
 
-use crate::program::{ProgramBuild, beside_this};
+use crate::program::{ProgramBuild, sibling_program};
 use crate::report::{Cell, Report, Results, Table, TableRow};
 use raywake::error::RunError;
 use raywake::order_statistics::Spread;
@@ -63,7 +63,7 @@ type Figures = [f64; FIGURES.len()];
 pub fn run(args: &Args) -> Result<(), RunError> {
     let settings = settings(&args.setting)?;
     atomic::create_folder(&args.out)?;
-    let program = args.program.clone().unwrap_or_else(beside_this);
+    let program = args.program.clone().unwrap_or_else(sibling_program);
     let mut rows = Vec::new();
     for (name, before, arguments) in settings {
         let of = |program: &Path| measure(args, program, before, arguments);

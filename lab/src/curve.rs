@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// The effect of a threshold: everything that scores above it is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Operating {
+pub struct OperatingPoint {
     /// Just below the lowest score kept.
     pub threshold: f64,
     /// Share of the foreground that is kept.
@@ -44,7 +44,7 @@ impl Curve {
     }
 
     /// The effect of every threshold, strictest first.
-    pub fn points(&self) -> impl Iterator<Item = Operating> {
+    pub fn points(&self) -> impl Iterator<Item = OperatingPoint> {
         (0..self.steps.len()).map(|at| self.operating(at))
     }
 
@@ -54,24 +54,26 @@ impl Curve {
     }
 
     /// The highest threshold that keeps this share of the foreground, 0..1.
-    pub fn at_recall(&self, recall: f64) -> Operating {
+    pub fn at_recall(&self, recall: f64) -> OperatingPoint {
         let wanted = recall * self.total[0] * (1.0 - 1e-12);
         let at = self.steps.partition_point(|s| s.1 < wanted).min(self.steps.len() - 1);
         self.operating(at)
     }
 
     /// The effect of keeping everything that scores above `threshold`.
-    pub fn above(&self, threshold: f64) -> Operating {
+    pub fn above(&self, threshold: f64) -> OperatingPoint {
         match self.steps.partition_point(|s| s.0 > threshold) {
-            0 => Operating { threshold, recall: 0.0, precision: 1.0, background_accuracy: 1.0 },
-            n => Operating { threshold, ..self.operating(n - 1) },
+            0 => {
+                OperatingPoint { threshold, recall: 0.0, precision: 1.0, background_accuracy: 1.0 }
+            }
+            n => OperatingPoint { threshold, ..self.operating(n - 1) },
         }
     }
 
-    fn operating(&self, at: usize) -> Operating {
+    fn operating(&self, at: usize) -> OperatingPoint {
         let (score, kept, wrong) = self.steps[at];
         let next = self.steps.get(at + 1).map_or(score - 1.0, |s| s.0);
-        Operating {
+        OperatingPoint {
             threshold: 0.5 * (score + next),
             recall: kept / self.total[0],
             precision: kept / (kept + wrong),

@@ -1,7 +1,7 @@
 //! `raywake-lab device`: runs the program on a Vulkan device and on the CPU alone, with every
 //! built-in profile: the results must be the same, and the times are compared.
 
-use crate::program::{ProgramBuild, Ran, beside_this};
+use crate::program::{ProgramBuild, ProgramRun, sibling_program};
 use crate::report::{Cell, Report, Results, Table, TableRow};
 use raywake::error::RunError;
 use raywake_core::params::Profile;
@@ -37,10 +37,10 @@ pub struct Args {
 const CORES: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// A run on the device, and one without it.
-struct Both {
+struct Runs {
     name: String,
-    device: Ran,
-    scalar: Ran,
+    device: ProgramRun,
+    scalar: ProgramRun,
 }
 
 /// Runs, compares, writes and prints.
@@ -49,7 +49,7 @@ struct Both {
 /// If a run fails, results differ or an output cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     atomic::create_folder(&args.out)?;
-    let path = args.program.clone().unwrap_or_else(beside_this);
+    let path = args.program.clone().unwrap_or_else(sibling_program);
     let program =
         ProgramBuild { path: &path, data: &args.data, sweeps: args.sweeps, out: &args.out };
     let index = args.device.map(|index| index.to_string());
@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         if let Some(what) = failure {
             return Err(Error::Usage(format!("{name}, {}: {what}", device.text("device"))));
         }
-        Ok(Both { name: name.to_owned(), device, scalar })
+        Ok(Runs { name: name.to_owned(), device, scalar })
     };
     let shipped = Profile::shipped();
     let profiles = shipped.iter().map(|profile| both(&profile.name, &[], &profile.name));
@@ -92,7 +92,7 @@ fn on_device() -> Vec<&'static str> {
     names
 }
 
-fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results, Error> {
+fn conclude(args: &Args, profiles: &[Runs], threads: &[Runs]) -> Result<Results, Error> {
     let name = profiles.first().map_or("", |both| both.device.text("device"));
     let mut report = Report::new("A Vulkan device and the CPU alone", "Side by side, same digest");
     report.fact("Device", name);
@@ -107,9 +107,9 @@ fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results,
 }
 
 /// Whole sweeps, and the part of them that the CPU does alongside the device.
-fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
+fn totals(id: &str, what: &str, runs: &[Runs]) -> Result<Table, Error> {
     let on_device = on_device();
-    let beside = |run: &Ran| -> Vec<(String, f64)> {
+    let beside = |run: &ProgramRun| -> Vec<(String, f64)> {
         let stages = run.stages_ms().filter(|(name, _)| !on_device.contains(name));
         stages.map(|(name, ms)| (name.to_owned(), ms)).collect()
     };
@@ -117,8 +117,9 @@ fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
     let columns = [what, "threads", "CPU alone", "p99", "with the device", "p99", "on the device"];
     let columns: Vec<&str> =
         columns.into_iter().chain(parts.iter().map(|(name, _)| name.as_str())).collect();
-    let row = |both: &Both| {
-        let total = |run: &Ran| Ok::<_, Error>([run.total_ms("median")?, run.total_ms("p99")?]);
+    let row = |both: &Runs| {
+        let total =
+            |run: &ProgramRun| Ok::<_, Error>([run.total_ms("median")?, run.total_ms("p99")?]);
         let [scalar, device] = [total(&both.scalar)?, total(&both.device)?];
         let used = both.device.summary["threads"].as_f64().unwrap_or_default();
         let cells = [Cell::from(both.name.as_str()), Cell::Number(used, 0)];
@@ -133,7 +134,7 @@ fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
 }
 
 /// Times of each stage in each profile.
-fn stages(profiles: &[Both]) -> Table {
+fn stages(profiles: &[Runs]) -> Table {
     let row = |name: &str| {
         let times = profiles.iter().map(|both| Cell::Number(both.device.stage_ms(name), 3));
         TableRow::new([Cell::from(name)].into_iter().chain(times))

@@ -7,7 +7,7 @@ use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::{Column, NONE, SweepUniform};
 use raywake_core::stages::{GRID, StageProgram, Storage, run};
 use raywake_core::sweep::{Rig, Sweep};
-use raywake_core::team::Alone;
+use raywake_core::team::SingleThread;
 use raywake_core::thinning::Thinning;
 
 /// Everything that a grid runs, and hence everything that its storage holds.
@@ -70,7 +70,7 @@ impl Grid {
         let window = place(&self.profile, rig, pose, Some(origin));
         let mut storage = Storage::over(&mut self.words, GRID_ALONE, &self.profile);
         let (count, _) = self.preparation.prepare(
-            &Alone,
+            &SingleThread,
             &Placement { profile: &self.profile, rig, window: &window, sweep },
             RayBuffers {
                 rays: storage.rays,
@@ -86,7 +86,7 @@ impl Grid {
         self.of_point.clear();
         self.of_point.extend((0..thinning.of()).map(column));
         storage.sweep = self.step;
-        run(GRID, &mut storage, 0, &Alone, &mut |_| ());
+        run(GRID, &mut storage, 0, &SingleThread, &mut |_| ());
         self.columns.copy_from_slice(storage.columns_now);
         window
     }
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_begins_anywhere_on_its_lattice() {
+    fn drives_may_start_anywhere_on_the_lattice() {
         let rig = rig();
         let mut grid = Grid::new(Profile::hdl64());
         let points = [Point { position: [11.3, -4.2, -0.5], ..Point::default() }];

@@ -51,7 +51,7 @@ const NAME_MAX: usize = 63;
 /// # Errors
 /// If Valgrind is missing or counts nothing; any error of a step; an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
-    if raywake_callgrind::is_watched() {
+    if raywake_callgrind::is_under_valgrind() {
         return step_by_step(args);
     }
     atomic::create_folder(&args.out)?;

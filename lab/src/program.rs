@@ -20,7 +20,7 @@ pub struct ProgramBuild<'a> {
 }
 
 /// Outcome of a run.
-pub struct Ran {
+pub struct ProgramRun {
     /// Its summary.
     pub summary: Value,
     /// CPU time, s.
@@ -31,7 +31,7 @@ pub struct Ran {
 }
 
 /// The program in the same folder as this one.
-pub fn beside_this() -> PathBuf {
+pub fn sibling_program() -> PathBuf {
     std::env::current_exe().map_or_else(|_| "raywake".into(), |own| own.with_file_name("raywake"))
 }
 
@@ -41,7 +41,7 @@ impl ProgramBuild<'_> {
     ///
     /// # Errors
     /// If it cannot be run, fails, or writes an invalid summary.
-    pub fn run(&self, before: &[&str], arguments: &[&str]) -> Result<Ran, Error> {
+    pub fn run(&self, before: &[&str], arguments: &[&str]) -> Result<ProgramRun, Error> {
         let failed = |what: String| Error::Usage(format!("{}: {what}", self.path.display()));
         let file = self.out.join("summary.json");
         let begin = Instant::now();
@@ -59,11 +59,11 @@ impl ProgramBuild<'_> {
             .ok_or_else(|| failed(format!("unexpected output of `times`: {times}")))?;
         let summary = serde_json::from_str(&whole::read_text(&file)?)
             .map_err(|e| Error::input(&file, format!("line {}", e.line()), e.to_string()))?;
-        Ok(Ran { summary, cpu_s, wall_s, file })
+        Ok(ProgramRun { summary, cpu_s, wall_s, file })
     }
 }
 
-impl Ran {
+impl ProgramRun {
     /// A figure of the time of a sweep, ms: `median`, `mean`, `p99`.
     ///
     /// # Errors

@@ -77,7 +77,7 @@ mod tests {
     const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/results");
 
     #[test]
-    fn results_md_is_what_the_kept_results_say() {
+    fn results_md_matches_the_kept_results() {
         let mut files: Vec<PathBuf> =
             std::fs::read_dir(KEPT).unwrap().map(|entry| entry.unwrap().path()).collect();
         files.sort();
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_result_is_refused() {
+    fn invalid_results_are_refused() {
         let scratch = Scratch::new();
         let refused =
             |text: &str| read(&scratch.write("results.json", text)).unwrap_err().to_string();

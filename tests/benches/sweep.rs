@@ -130,7 +130,11 @@ const OBJECTS: usize = 20;
 const TRIES: usize = 5;
 
 /// The longest sweep of the fixed lag when many objects appear at once.
-fn born_at_once(estimator: &mut Estimator, batches: &[Vec<ObjectReturn>], history: &[ObjectState]) {
+fn simultaneous_births(
+    estimator: &mut Estimator,
+    batches: &[Vec<ObjectReturn>],
+    history: &[ObjectState],
+) {
     let mut fastest = vec![f64::MAX; batches.len()];
     for _ in 0..TRIES {
         let mut lags: Vec<FixedLag> = (0..OBJECTS).map(|_| FixedLag::new()).collect();
@@ -217,7 +221,7 @@ fn tracks(sweeps: &[SimSweep]) {
         estimator.model().as_flattened().iter().for_each(|v| variant.digest.word(v.to_bits()));
         variants.push(variant);
     }
-    born_at_once(&mut estimator, &batches, &history);
+    simultaneous_births(&mut estimator, &batches, &history);
     let mut variant = Variant::new("fixed lag, a push".into());
     let mut lag = FixedLag::new();
     for (n, (batch, baseline)) in batches.iter().zip(&history).enumerate() {

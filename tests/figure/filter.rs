@@ -39,7 +39,7 @@ fn check_odometry(sweep: &SimSweep, next: &SimSweep, stages: &Stages) {
 }
 
 #[test]
-fn where_nothing_may_move_all_flow_is_odometry() {
+fn flow_equals_odometry_if_nothing_may_move() {
     // The refinement moves objects whose columns the filter removed.
     let cells = Profile { refinement_sweeps: 0, ..Profile::hdl64() };
     for profile in [cells, Profile::dissertation()] {

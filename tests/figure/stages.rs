@@ -74,7 +74,7 @@ fn dissertation_filtered() {
 }
 
 #[test]
-fn a_window_of_other_sizes() {
+fn windows_of_other_sizes() {
     let profile = Profile { side: 31, levels: 16, em_rounds: 3, ..Profile::hdl64() };
     let setup = Setup::new(profile, Some(weights::filter(41, 16, 100, 0)));
     // The shipped classifier has 14 levels, so another one is used for 16.

@@ -26,7 +26,7 @@ pub struct Setup {
 impl Setup {
     /// Setup for a simulated drive.
     pub fn new(profile: Profile, filter: Option<String>) -> Setup {
-        let nowhere = raywake_sim::Path::standing(0.0, 0.0, 0.0);
+        let nowhere = raywake_sim::Path::stationary(0.0, 0.0, 0.0);
         let drive = Drive::through(Scene::empty(), nowhere, 0, raywake_sim::Options::default());
         Setup { profile, rig: drive.rig(), filter }
     }

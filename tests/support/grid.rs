@@ -8,7 +8,7 @@ use raywake_core::stages::grid::ray_merge::ray_merge;
 use raywake_core::stages::grid::ray_trace::ray_trace;
 use raywake_core::stages::{COUNTERS, DISTINCT_COUNT};
 use raywake_core::sweep::{Rig, Sweep};
-use raywake_core::team::Alone;
+use raywake_core::team::SingleThread;
 
 /// A sweep as rays in a window.
 pub struct Rays {
@@ -27,7 +27,7 @@ impl Rays {
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
         let preparation = Preparation::new();
         let (count, _) = preparation.prepare(
-            &Alone,
+            &SingleThread,
             &Placement { profile, rig, window, sweep },
             RayBuffers {
                 rays: &mut rays,

@@ -3,11 +3,11 @@
 use raywake::backend::{Backend, Tables};
 use raywake_core::output::{ColumnFlow, Output, PointFlow, ReturnFlow, TrackletState};
 use raywake_core::params::POINTS_MAX;
-use raywake_core::perceive::{Machine, Perceive, Perceived, RayInput, StageTimer};
+use raywake_core::perceive::{Perceive, Perceived, RayInput, StageTimer, StepContext};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::record::SweepUniform;
-use raywake_core::team::{Alone, Team};
+use raywake_core::team::{SingleThread, Team};
 use raywake_gpu::GpuError;
 use raywake_sim::SimSweep;
 use std::ops::DerefMut;
@@ -107,7 +107,7 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
         let out = Output { columns: &mut columns, points: &mut points };
         let seen = before.map_or(&[][..], |b| &b.points);
         let mut witness = Witness { backend: &mut self.backend, stages: Stages::default() };
-        let machine = Machine { backend: &mut witness, team: &Alone, timer: &mut () };
+        let machine = StepContext { backend: &mut witness, team: &SingleThread, timer: &mut () };
         let stepped = self.pipeline.step(&self.setup, machine, &sweep(now), seen, out);
         let flows = stepped.unwrap_or_else(|e| panic!("{e}")).flows;
         let mut stages = witness.stages;

@@ -17,7 +17,7 @@ struct Package<'a> {
     /// File of every module.
     modules: BTreeMap<Names, &'a str>,
     /// Names that a module re-exports.
-    handed_on: BTreeMap<(Names, String), Names>,
+    reexports: BTreeMap<(Names, String), Names>,
 }
 
 /// Groups of files that depend on each other in a circle.
@@ -71,8 +71,8 @@ impl<'a> Package<'a> {
         for _ in 0..STEPS {
             let length = (0..=path.len()).rev().find(|n| self.modules.contains_key(&path[..*n]));
             let (module, rest) = path.split_at(length.unwrap_or(0));
-            let handed_on = rest.first().map(|name| (module.to_vec(), name.clone()));
-            match handed_on.and_then(|key| self.handed_on.get(&key)) {
+            let reexports = rest.first().map(|name| (module.to_vec(), name.clone()));
+            match reexports.and_then(|key| self.reexports.get(&key)) {
                 Some(target) => path = [target, &rest[1..]].concat(),
                 None => return self.modules.get(module).copied().unwrap_or_default(),
             }
@@ -131,7 +131,7 @@ impl Paths<'_, '_> {
         let (Some(target), Some(last)) = (self.absolute(path), path.last()) else { return };
         if public {
             let name = renamed.unwrap_or_else(|| last.clone());
-            self.package.handed_on.insert((self.module.clone(), name), target);
+            self.package.reexports.insert((self.module.clone(), name), target);
         } else {
             self.found.insert(target);
         }

@@ -174,7 +174,7 @@ fn flows_that_agree() {
 }
 
 #[test]
-fn nothing_is_feasible_where_every_target_is_taken() {
+fn nothing_is_feasible_if_every_target_is_taken() {
     let mut round = Round::first(with(31, SETTINGS[0]), (0..961).collect(), || 9);
     round.target_energy.fill(0);
     let proposal = round.check("taken");

@@ -100,7 +100,7 @@ fn entry_points(source: &str) -> impl Iterator<Item = &str> {
 }
 
 #[test]
-fn a_wrong_word_is_noticed() {
+fn a_wrong_word_is_detected() {
     let bench =
         |kernel| Bench::new(None).buffer("counters", vec![7; COUNTERS]).groups(kernel, 1).run();
     let Some(outcome) = bench(&raywake_kernels::kernel::PLAN) else { return };

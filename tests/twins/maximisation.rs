@@ -113,7 +113,7 @@ fn anywhere(random: &mut Random) -> [i32; 2] {
 }
 
 #[test]
-fn claimants_of_every_number() {
+fn every_number_of_claimants() {
     let mut random = Random::new(24);
     for count in [around(ROW_WORKGROUP), [2, 300, 900, 960, 961]].concat() {
         let first = random.below(962 - count as u32);
@@ -129,7 +129,7 @@ fn claimants_of_every_number() {
 }
 
 #[test]
-fn nobody_claims_anything() {
+fn no_claimants() {
     let foreground: Vec<u32> = (0..961).collect();
     let proposal = vec![[0, NONE]; 961];
     Round { step: window(31, 14), foreground, proposal }.check("no proposals");

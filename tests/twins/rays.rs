@@ -65,7 +65,7 @@ impl Merged {
     }
 
     /// Number of entries without a slot in the table.
-    fn crowded_out(&self) -> usize {
+    fn without_slot(&self) -> usize {
         self.distinct.iter().filter(|e| **e >= MERGE_SLOTS as u32).count()
     }
 }
@@ -133,9 +133,9 @@ fn a_crowd_beyond_the_probes_changes_no_sum() {
     };
     let twin = Merged::by_twin(&rays);
     let alone = 4 * (crowd.len() - MERGE_PROBES as usize);
-    assert_eq!(twin.crowded_out(), alone);
+    assert_eq!(twin.without_slot(), alone);
     let Some(kernel) = Merged::by_kernel(&rays) else { return };
-    assert_eq!(kernel.crowded_out(), alone);
+    assert_eq!(kernel.without_slot(), alone);
     assert!(difference(&trace(&kernel), &trace(&twin)).is_none());
     check_trace("crowd", &step, &origins, &twin);
     check_trace("crowd, as the kernel merged it", &step, &origins, &kernel);

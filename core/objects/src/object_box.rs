@@ -53,7 +53,7 @@ impl ObjectBox {
     ) -> Option<ObjectBox> {
         let mut kept = Thinned::<[f32; 3], PLACES_MAX>::new();
         places.filter(|p| p.iter().all(|v| v.is_finite())).for_each(|p| kept.push(p));
-        let mut ends = Ends { trim: params.box_trim, values: heapless::Vec::new() };
+        let mut ends = TrimmedRange { trim: params.box_trim, values: heapless::Vec::new() };
         let [low, high] = ends.of(kept.kept().iter().map(|p| p[2]))?;
         let along_motion = moved_m >= params.box_along_motion_m;
         let mut turn = if along_motion { 0.0 } else { direction(params, kept.kept(), &mut ends)? };
@@ -73,12 +73,12 @@ impl ObjectBox {
 }
 
 /// Minimum and maximum of values, ignoring a share of them at either end.
-struct Ends {
+struct TrimmedRange {
     trim: f32,
     values: heapless::Vec<f32, PLACES_MAX>,
 }
 
-impl Ends {
+impl TrimmedRange {
     fn of(&mut self, values: impl Iterator<Item = f32>) -> Option<[f32; 2]> {
         self.values.clear();
         // There is room for as many points as are kept.
@@ -96,14 +96,14 @@ fn turned([x, y, _]: &[f32; 3], (sin, cos): (f32, f32)) -> [f32; 2] {
 }
 
 /// Ends along a direction and to its left, m.
-fn sides(places: &[[f32; 3]], turn: f32, ends: &mut Ends) -> Option<[[f32; 2]; 2]> {
+fn sides(places: &[[f32; 3]], turn: f32, ends: &mut TrimmedRange) -> Option<[[f32; 2]; 2]> {
     let by = libm::sincosf(turn);
     let mut side = |axis: usize| ends.of(places.iter().map(|p| turned(p, by)[axis]));
     Some([side(0)?, side(1)?])
 }
 
 /// The direction, from 0 to a quarter turn, in which points are closest to the edges.
-fn direction(params: &BoxParams, places: &[[f32; 3]], ends: &mut Ends) -> Option<f32> {
+fn direction(params: &BoxParams, places: &[[f32; 3]], ends: &mut TrimmedRange) -> Option<f32> {
     let mut best = (f32::NEG_INFINITY, 0.0);
     let steps = (FRAC_PI_2 / params.box_step_rad) as u32;
     for step in 0..=steps {
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn two_sides_of_a_parked_car_tell_its_box() {
+    fn two_sides_of_a_parked_car_determine_its_box() {
         let mut random = Random(3);
         for step in 0..18 {
             let turn = step as f32 * 0.17;
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_is_long_along_its_motion() {
+    fn movers_are_longest_along_their_motion() {
         // A bus seen from behind: the visible part is wider than long.
         let places = (0..200).map(|n| [0.02 * (n % 10) as f32, 0.0125 * n as f32, 1.0]);
         let moving = ObjectBox::around(&PARAMS, places.clone(), 5.0).unwrap();

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn none_pass_where_something_is_before_it_or_beside() {
+    fn no_ray_passes_where_something_is_in_front_or_beside() {
         for range in [8.0, 20.5] {
             let panorama = scene(60.0, |_, off| (9.1..15.0).contains(&off).then_some(range));
             assert_eq!(panorama.passed(&PARAMS, FROM, at(60.0 + 9.0, 1, 20.0)), [false, false]);
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_is_no_end() {
+    fn a_ray_through_a_window_does_not_pass() {
         let window = |beam, off: f32| (beam == 2 && off.abs() < 2.9).then_some(40.0);
         let panorama = scene(60.0, window);
         for beam in 0..BEAMS.len() {
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn where_nothing_is_known_nothing_passes() {
+    fn nothing_passes_through_unknown_space() {
         let mut panorama = scene(60.0, |_, _| None);
         panorama.clear();
         assert_eq!(panorama.passed(&PARAMS, FROM, at(70.0, 1, 20.0)), [false; 2]);

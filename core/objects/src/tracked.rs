@@ -7,7 +7,9 @@ use raywake_core::params::Profile;
 use raywake_core::sweep::{Rig, Sweep};
 
 use crate::ObjectState;
-use crate::front_end::{Flows, FrontEnd, Life, StateVariances, TRACKS_MAX, Track, TrackingCounts};
+use crate::front_end::{
+    Flows, FrontEnd, StateVariances, TRACKS_MAX, Track, TrackStatus, TrackingCounts,
+};
 use crate::object_box::ObjectBox;
 use crate::params::TrackingParams;
 
@@ -54,7 +56,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
 
     /// Returns the object, if the track lives and is old enough to be shown.
     pub fn object(&self, params: &TrackingParams) -> Option<TrackedObject> {
-        let shown = self.life == Life::Live && self.observations >= UPDATES_MIN;
+        let shown = self.status == TrackStatus::Live && self.observations >= UPDATES_MIN;
         let state = self.state().filter(|_| shown)?;
         let places = self.latest().iter().map(|seen| state.local(seen.position));
         let around = ObjectBox::around(&params.boxes, places, self.moved_m())?;
@@ -146,7 +148,7 @@ impl ObjectTracker {
 mod tests {
     extern crate std;
     use super::*;
-    use crate::front_end::scene::{OFFSETS, Thing, rig, seen};
+    use crate::front_end::scene::{OFFSETS, SceneBox, rig, seen};
     use raywake_core::pose::{Pose, Twist};
     use std::vec::Vec;
 
@@ -154,11 +156,11 @@ mod tests {
 
     /// Without the flow, a moving and a parked car: what is kept of the past makes no difference.
     #[test]
-    fn what_a_track_keeps_does_not_matter() {
+    fn number_of_kept_returns_does_not_matter() {
         let mut short = raywake_alloc_guard::boxed!(ObjectTracker, ObjectTracker::new());
         let mut front_end = raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new());
         let mut tracks = std::vec![Track::<8, 16>::new(); TRACKS_MAX];
-        let things = [Thing::car(-20.0, 6.0, [12.0, 0.0]), Thing::car(8.0, -5.0, [0.0; 2])];
+        let things = [SceneBox::car(-20.0, 6.0, [12.0, 0.0]), SceneBox::car(8.0, -5.0, [0.0; 2])];
         let rig = rig(1, OFFSETS);
         let mut last = Vec::new();
         for n in 0..30 {
@@ -166,7 +168,7 @@ mod tests {
             let moved = things.map(|thing| {
                 let [u, v] = thing.velocity;
                 let at = [0.1 * f64::from(n) * u, 0.1 * f64::from(n) * v];
-                Thing { at: [thing.at[0] + at[0], thing.at[1] + at[1]], ..thing }
+                SceneBox { at: [thing.at[0] + at[0], thing.at[1] + at[1]], ..thing }
             });
             let points = seen(&moved, 0.0, 0.0, 0);
             let (world_from_vehicle, twist) = (Pose::IDENTITY, Twist::ZERO);

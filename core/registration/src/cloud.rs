@@ -45,14 +45,14 @@ impl<'a> OrientedCloud<'a> {
     }
 
     /// Number of points with a normal.
-    pub fn flat_count(&self) -> usize {
+    pub fn normal_count(&self) -> usize {
         self.flat
     }
 }
 
 /// Normal of the flat patch around a place, or zero if there is none.
 fn normal(points: &[OrientedPoint], at: DVec3) -> DVec3 {
-    let near = tree::nearest_few::<{ *NEIGHBOURS.end() }>(points, at, NEIGHBOUR_M * NEIGHBOUR_M);
+    let near = tree::k_nearest::<{ *NEIGHBOURS.end() }>(points, at, NEIGHBOUR_M * NEIGHBOUR_M);
     if near.len() < *NEIGHBOURS.start() {
         return DVec3::ZERO;
     }
@@ -75,12 +75,12 @@ mod tests {
         let mut slope: Vec<_> = (0..400).map(at).map(plane).collect();
         let cloud = OrientedCloud::new(&mut slope);
         let expected = DVec3::new(-0.5, 0.0, 1.0).normalize();
-        assert_eq!(cloud.flat_count(), 400);
+        assert_eq!(cloud.normal_count(), 400);
         assert!(cloud.points().iter().all(|p| p.normal.dot(expected).abs() > 1.0 - 1e-12));
         let mut line: Vec<_> =
             (0..400).map(|n| OrientedPoint::from(DVec3::new(0.1 * n as f64, 0.0, 0.0))).collect();
         let line = OrientedCloud::new(&mut line);
-        assert_eq!((line.points().len(), line.flat_count()), (400, 0));
+        assert_eq!((line.points().len(), line.normal_count()), (400, 0));
     }
 
     #[test]
@@ -88,6 +88,6 @@ mod tests {
         let mut bad = [DVec3::NAN, DVec3::INFINITY, DVec3::splat(1e300)].map(OrientedPoint::from);
         assert!(OrientedCloud::new(&mut bad).points().is_empty());
         let mut same = vec![OrientedPoint::from(DVec3::ONE); 100];
-        assert_eq!(OrientedCloud::new(&mut same).flat_count(), 0);
+        assert_eq!(OrientedCloud::new(&mut same).normal_count(), 0);
     }
 }

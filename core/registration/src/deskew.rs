@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn returns_that_are_no_surroundings() {
+    fn unusable_returns() {
         let bad = [
             point(f32::NAN, 5.0, 0.0),
             point(f32::INFINITY, 5.0, 0.0),

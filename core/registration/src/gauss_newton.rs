@@ -41,21 +41,21 @@ pub struct GaussNewtonStep {
     pub least_eigenvalue: f64,
     /// Motions that the correspondences do not determine; the step undoes what earlier ones did in
     /// these.
-    pub unobserved: Unobserved,
+    pub unobservable: UnobservableMotions,
 }
 
 /// Number of independent motions that no residual determines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Unobserved {
+pub struct UnobservableMotions {
     /// Mostly translation along the ground or rotation on it: x, y, yaw.
     pub planar: usize,
     /// Mostly height, roll or pitch, which change little within a sweep.
     pub upright: usize,
 }
 
-impl Unobserved {
+impl UnobservableMotions {
     /// Nothing is known.
-    pub const ALL: Unobserved = Unobserved { planar: 3, upright: 3 };
+    pub const ALL: UnobservableMotions = UnobservableMotions { planar: 3, upright: 3 };
 
     /// The number of both kinds.
     pub fn count(&self) -> usize {
@@ -91,13 +91,13 @@ pub fn solve(
     }
     let eigen = SymmetricEigen::new(matrix);
     let done = about_inverse(done, centre, spread);
-    let (x, unobserved) = observed(&eigen, &right, &done, observable);
+    let (x, unobservable) = observed(&eigen, &right, &done, observable);
     let (turn, shift) = (DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5]));
     Some(GaussNewtonStep {
         motion: about(centre, turn / spread, shift),
         change_m: libm::sqrt(x.dot(&(matrix * x)).max(0.0)),
         least_eigenvalue: eigen.eigenvalues.min().max(0.0),
-        unobserved,
+        unobservable,
     })
 }
 
@@ -116,8 +116,8 @@ fn observed(
     right: &Vector6<f64>,
     done: &Vector6<f64>,
     observable: f64,
-) -> (Vector6<f64>, Unobserved) {
-    let (mut x, mut unobserved) = (Vector6::zeros(), Unobserved::default());
+) -> (Vector6<f64>, UnobservableMotions) {
+    let (mut x, mut unobservable) = (Vector6::zeros(), UnobservableMotions::default());
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         if *value > observable {
             x.axpy(vector.dot(right) / value, &vector, 1.0);
@@ -126,11 +126,11 @@ fn observed(
         x.axpy(-vector.dot(done), &vector, 1.0);
         let planar: f64 = vector.fixed_rows::<3>(2).norm_squared();
         match planar > 0.5 {
-            true => unobserved.planar += 1,
-            false => unobserved.upright += 1,
+            true => unobservable.planar += 1,
+            false => unobservable.upright += 1,
         }
     }
-    (x, unobserved)
+    (x, unobservable)
 }
 
 /// Derivatives of the residual with respect to rotation about the centre (times the spread) and
@@ -208,7 +208,7 @@ mod tests {
             .collect();
         let step = solve(&plane, &Pose::IDENTITY, 1e-3).unwrap();
         assert!(
-            step.unobserved == Unobserved { planar: 3, upright: 0 }
+            step.unobservable == UnobservableMotions { planar: 3, upright: 0 }
                 && step.least_eigenvalue < 1e-12
         );
         let moved = step.motion.translation - DVec3::new(0.0, 0.0, -0.3);

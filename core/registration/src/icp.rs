@@ -5,7 +5,7 @@
 //! motion. Kernel and search radius shrink over three levels, so that it can start far off.
 
 use crate::cloud::OrientedCloud;
-use crate::gauss_newton::{Correspondence, Unobserved, solve};
+use crate::gauss_newton::{Correspondence, UnobservableMotions, solve};
 use crate::tree;
 use raywake_core::pose::Pose;
 
@@ -53,7 +53,7 @@ pub struct Registration {
     pub least_eigenvalue: f64,
     /// Motions that the clouds do not determine (a plane leaves three): in those the pose keeps the
     /// initial value.
-    pub unobserved: Unobserved,
+    pub unobservable: UnobservableMotions,
 }
 
 impl Registration {
@@ -66,7 +66,7 @@ impl Registration {
             inliers: 0,
             overlap: 0.0,
             least_eigenvalue: 0.0,
-            unobserved: Unobserved::ALL,
+            unobservable: UnobservableMotions::ALL,
         }
     }
 }
@@ -113,7 +113,7 @@ pub fn register(
         return Registration::unmatched(Pose::IDENTITY);
     }
     let mut result = Registration::unmatched(initial);
-    let stride = source.flat_count().div_ceil(correspondences.len().max(1)).max(1);
+    let stride = source.normal_count().div_ceil(correspondences.len().max(1)).max(1);
     for (radius, kernel, every) in LEVELS {
         let level = Level {
             radius_m: radius * options.distance_m,
@@ -128,10 +128,10 @@ pub fn register(
                 break;
             }
         }
-        let tried = source.flat_count().div_ceil(level.stride);
-        result.judge(&correspondences[..matched], tried, level.kernel_m);
+        let tried = source.normal_count().div_ceil(level.stride);
+        result.evaluate(&correspondences[..matched], tried, level.kernel_m);
     }
-    result.converged &= result.inliers >= CORRESPONDENCES_MIN && result.unobserved.count() < 6;
+    result.converged &= result.inliers >= CORRESPONDENCES_MIN && result.unobservable.count() < 6;
     result
 }
 
@@ -178,13 +178,13 @@ impl Registration {
         self.pose = step.motion * self.pose;
         self.iterations += 1;
         self.least_eigenvalue = step.least_eigenvalue;
-        self.unobserved = step.unobserved;
+        self.unobservable = step.unobservable;
         self.converged = step.change_m < SETTLED_M;
         !self.converged
     }
 
     /// Determines the number of inliers, their share of the points tried, and how far they are off.
-    pub(crate) fn judge(
+    pub(crate) fn evaluate(
         &mut self,
         correspondences: &[Correspondence],
         tried: usize,

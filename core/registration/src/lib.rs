@@ -34,7 +34,7 @@ mod point;
 mod tree;
 
 pub use cloud::OrientedCloud;
-pub use gauss_newton::{Correspondence, Unobserved};
+pub use gauss_newton::{Correspondence, UnobservableMotions};
 pub use icp::{CORRESPONDENCES, IcpOptions, Registration, register};
 pub use multi_start::register_multi_start;
 pub use odometry::Odometry;

@@ -14,14 +14,14 @@ pub const OVERLAP_MIN: f64 = 0.4;
 const OVERLAP_SURE: f64 = 0.5;
 /// Further starts are this far off, in four directions, m, for motions that registration from no
 /// motion does not reach.
-const AWAY_M: f64 = 5.0;
+const OFFSET_M: f64 = 5.0;
 /// They are also rotated by this much to either side, rad.
 const TURNED_RAD: f64 = 0.17;
 
 impl Registration {
     /// Whether the clouds show the same place and determine the motion on the ground.
     pub fn is_accepted(&self) -> bool {
-        self.converged && self.overlap >= OVERLAP_MIN && self.unobserved.planar == 0
+        self.converged && self.overlap >= OVERLAP_MIN && self.unobservable.planar == 0
     }
 
     fn is_sure(&self) -> bool {
@@ -54,7 +54,7 @@ pub fn register_multi_start(
 
 /// Starts other than no motion.
 fn starts() -> impl Iterator<Item = Pose> {
-    let places = [(0.0, 0.0), (AWAY_M, 0.0), (-AWAY_M, 0.0), (0.0, AWAY_M), (0.0, -AWAY_M)];
+    let places = [(0.0, 0.0), (OFFSET_M, 0.0), (-OFFSET_M, 0.0), (0.0, OFFSET_M), (0.0, -OFFSET_M)];
     let turned = move |yaw| places.map(|(x, y)| Pose::planar(x, y, 0.0, yaw));
     [0.0, TURNED_RAD, -TURNED_RAD].into_iter().flat_map(turned).skip(1)
 }
@@ -148,7 +148,7 @@ mod tests {
     /// Scenes that look the same when displaced along some direction, seen twice: no motion would
     /// be a guess.
     #[test]
-    fn what_determines_too_little_is_refused() {
+    fn underdetermined_input_is_refused() {
         let wall = |u: f64, v: f64| [40.0 * u - 20.0, 6.0, 8.0 * v - 1.7];
         let tunnel = |u: f64, v: f64| {
             let (sin, cos) = (libm::sin(TAU * v), libm::cos(TAU * v));
@@ -162,7 +162,7 @@ mod tests {
         ];
         for (clouds, planar) in &mut scenes {
             let found = registered(clouds);
-            assert_eq!(found.unobserved.planar, *planar, "{found:?}");
+            assert_eq!(found.unobservable.planar, *planar, "{found:?}");
             assert!(found.overlap > OVERLAP_MIN && !found.is_accepted(), "{found:?}");
         }
     }

@@ -46,7 +46,7 @@ fn motion(degrees: f64, axis: DVec3, translation: DVec3) -> Pose {
 }
 
 #[test]
-fn an_exact_motion_comes_back() {
+fn an_exact_motion_is_recovered() {
     let target = corner();
     let cases = [
         motion(0.0, DVec3::X, DVec3::ZERO),
@@ -57,7 +57,7 @@ fn an_exact_motion_comes_back() {
         let source = moved(&target, &truth.inverse());
         let found = registered(&source, &target, Pose::IDENTITY);
         let (metres, radians) = apart(&found.pose, &truth);
-        assert!(found.converged && found.unobserved.count() == 0, "{found:?}");
+        assert!(found.converged && found.unobservable.count() == 0, "{found:?}");
         assert!(metres < 1e-6 && radians < 1e-6, "{metres} m, {radians} rad, {found:?}");
         assert!(found.rms_m < 1e-6 && found.inliers > 3000, "{found:?}");
         assert_eq!(found, registered(&source, &target, Pose::IDENTITY));
@@ -95,7 +95,7 @@ fn a_plane_determines_three_motions_and_no_more() {
     let source: Vec<_> = plane().into_iter().map(|p| p - DVec3::new(0.0, 0.0, 0.2)).collect();
     let initial = Pose::planar(0.7, 0.1, 0.0, 0.02);
     let found = registered(&source, &target, initial);
-    assert_eq!(found.unobserved.planar, 3, "{found:?}");
+    assert_eq!(found.unobservable.planar, 3, "{found:?}");
     assert!(found.least_eigenvalue < OBSERVABLE);
     let t = found.pose.translation;
     assert!((t - DVec3::new(0.7, 0.1, 0.2)).length() < 0.01, "{t}");

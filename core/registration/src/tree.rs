@@ -40,7 +40,7 @@ pub fn nearest(points: &[OrientedPoint], query: DVec3, within2: f64) -> Option<u
 
 /// The up to `N` points nearest to `query` with squared distances below `within2`, m^2: squared
 /// distance and index, nearest first.
-pub fn nearest_few<const N: usize>(
+pub fn k_nearest<const N: usize>(
     points: &[OrientedPoint],
     query: DVec3,
     within2: f64,
@@ -117,7 +117,7 @@ mod tests {
                 all.retain(|d2| *d2 < 4.0);
                 let found = nearest(&points, query, 4.0).map(|n| distance2(&points[n]));
                 assert_eq!(found, all.first().copied());
-                let few = nearest_few::<COUNT>(&points, query, 4.0);
+                let few = k_nearest::<COUNT>(&points, query, 4.0);
                 let distances: Vec<f64> = few.iter().map(|f| f.0).collect();
                 assert_eq!(distances, all[..all.len().min(COUNT)]);
                 assert!(few.iter().all(|(d2, n)| distance2(&points[*n]) == *d2));
@@ -126,10 +126,10 @@ mod tests {
     }
 
     #[test]
-    fn equal_points_are_no_trap() {
+    fn equal_points_are_handled() {
         let mut points = std::vec![OrientedPoint::from(DVec3::ONE); 10_000];
         build(&mut points);
-        let few = nearest_few::<5>(&points, DVec3::ONE, 1.0);
+        let few = k_nearest::<5>(&points, DVec3::ONE, 1.0);
         assert_eq!((few.len(), few[4].0), (5, 0.0));
         assert_eq!(nearest(&points, DVec3::ZERO, 1.0), None);
     }

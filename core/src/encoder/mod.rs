@@ -126,7 +126,7 @@ pub struct Activations {
 /// One sweep's columns, their scores, and the working memory.
 pub struct Encoder {
     weights: EncoderWeights,
-    is_on: bool,
+    has_weights: bool,
     columns: [Column; COLUMNS_MAX],
     /// Columns of the window along an axis; 0 if none are kept.
     side: usize,
@@ -147,7 +147,7 @@ impl Encoder {
     pub const fn new() -> Encoder {
         Encoder {
             weights: EncoderWeights::new(),
-            is_on: false,
+            has_weights: false,
             columns: [[0; 2]; COLUMNS_MAX],
             side: 0,
             corner: [0; 2],
@@ -163,7 +163,7 @@ impl Encoder {
     /// Encodes with these weights from now on; `None` turns encoding off.
     pub fn set_weights(&mut self, weights: Option<&EncoderWeights>) {
         self.clear();
-        self.is_on = weights.is_some();
+        self.has_weights = weights.is_some();
         self.weights = weights.cloned().unwrap_or_default();
     }
 
@@ -175,18 +175,18 @@ impl Encoder {
     ) -> Result<(), E> {
         self.clear();
         let loaded = load(&mut self.weights);
-        self.is_on = loaded.is_ok();
+        self.has_weights = loaded.is_ok();
         loaded
     }
 
     /// Whether it has weights.
-    pub fn is_on(&self) -> bool {
-        self.is_on
+    pub fn has_weights(&self) -> bool {
+        self.has_weights
     }
 
     /// Keeps the columns of a square window whose first is world column `corner`.
     pub fn keep(&mut self, columns: &[Column], side: usize, corner: [i32; 2]) {
-        if !self.is_on {
+        if !self.has_weights {
             return;
         }
         (self.side, self.corner) = (side, corner);

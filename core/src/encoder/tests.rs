@@ -4,7 +4,7 @@ extern crate std;
 use super::*;
 use crate::digest::Digest;
 use crate::random::Random;
-use crate::team::Alone;
+use crate::team::SingleThread;
 use std::fmt::Write;
 use std::string::String;
 use std::vec::Vec;
@@ -49,7 +49,7 @@ fn encoded(
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
     encoder.set_weights(Some(weights));
     encoder.keep(columns, side, corner);
-    encoder.encode(&Alone);
+    encoder.encode(&SingleThread);
     encoder.scores().to_vec()
 }
 
@@ -153,7 +153,7 @@ impl Naive<'_> {
 }
 
 #[test]
-fn scores_are_those_of_the_formulas() {
+fn scores_follow_the_formulas() {
     let mut random = Random(11);
     for (side, corner) in [(41, [0, 0]), (40, [-3, 13]), (7, [5, 2]), (1, [7, 7])] {
         let numbers = drawn(&mut random);
@@ -167,7 +167,7 @@ fn scores_are_those_of_the_formulas() {
 }
 
 #[test]
-fn what_stands_keeps_its_scores_when_the_window_shifts() {
+fn static_structure_keeps_its_scores_when_the_window_shifts() {
     let mut weights = EncoderWeights::new();
     weights.load(SHIPPED, LEVELS).unwrap();
     let mut random = Random(12);

@@ -27,7 +27,7 @@ pub struct ProfileError {
     /// The offending parameter.
     pub field: &'static str,
     /// What it must be.
-    pub must: &'static str,
+    pub requirement: &'static str,
 }
 
 /// The declaration of one parameter.
@@ -105,7 +105,7 @@ impl Bounds {
 /// A type a parameter may have.
 pub trait Kind: Copy {
     /// What a value of this type must be, in words.
-    const MUST: &'static str;
+    const REQUIREMENT: &'static str;
 
     /// Converts to a [`Value`].
     fn value(self) -> Value<'static>;
@@ -115,9 +115,9 @@ pub trait Kind: Copy {
 }
 
 macro_rules! kinds {
-    ($($kind:ty, $must:literal, $given:pat => $of:expr, $own:ident => $value:expr;)*) => {$(
+    ($($kind:ty, $requirement:literal, $given:pat => $of:expr, $own:ident => $value:expr;)*) => {$(
         impl Kind for $kind {
-            const MUST: &'static str = $must;
+            const REQUIREMENT: &'static str = $requirement;
 
             fn value(self) -> Value<'static> {
                 let $own = self;
@@ -162,7 +162,7 @@ pub trait Parameters {
     fn within_bounds(&self) -> Result<(), ProfileError> {
         let outside = |p: &&Parameter| !self.get(p.name).is_none_or(|v| p.bounds.hold(v));
         match self.declared().iter().find(outside) {
-            Some(p) => Err(ProfileError { field: p.name, must: p.bounds.text }),
+            Some(p) => Err(ProfileError { field: p.name, requirement: p.bounds.text }),
             None => Ok(()),
         }
     }
@@ -277,8 +277,8 @@ macro_rules! params {
             ) -> Result<(), &'static str> {
                 match name {
                     $(stringify!($name) => {
-                        let must = <$kind as $crate::params::Kind>::MUST;
-                        self.$name = $crate::params::Kind::of(value).ok_or(must)?;
+                        let requirement = <$kind as $crate::params::Kind>::REQUIREMENT;
+                        self.$name = $crate::params::Kind::of(value).ok_or(requirement)?;
                     })*
                     _ => return Err("the name of a parameter"),
                 }
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_declaration_is_all_there_is() {
+    fn declarations_are_complete() {
         let mut p = Some3::DEFAULT;
         assert_eq!((p.within_bounds(), p.other), (Ok(()), 3));
         let [_, count, _] = p.declared() else { panic!("three") };
@@ -329,6 +329,9 @@ mod tests {
         assert!(p.set("frame", Value::Word("x")).unwrap_err().contains("lattice"));
         assert!(p.set("nosuch", Value::Flag(true)).is_err());
         p = Some3 { single: f32::NAN, ..Some3::DEFAULT };
-        assert_eq!(p.within_bounds(), Err(ProfileError { field: "single", must: "0.7 to 0.9" }));
+        assert_eq!(
+            p.within_bounds(),
+            Err(ProfileError { field: "single", requirement: "0.7 to 0.9" })
+        );
     }
 }

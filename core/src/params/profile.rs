@@ -18,7 +18,7 @@ pub enum Frame {
 }
 
 impl Kind for Frame {
-    const MUST: &'static str = "lattice or sensor";
+    const REQUIREMENT: &'static str = "lattice or sensor";
 
     fn value(self) -> Value<'static> {
         Value::Word(if self == Frame::Lattice { "lattice" } else { "sensor" })
@@ -209,7 +209,7 @@ impl Profile {
             (!self.name.is_empty(), "name", "not empty"),
         ];
         match rules.iter().find(|r| !r.0) {
-            Some(&(_, field, must)) => Err(ProfileError { field, must }),
+            Some(&(_, field, requirement)) => Err(ProfileError { field, requirement }),
             None => Ok(()),
         }
     }

@@ -15,7 +15,7 @@ pub enum Birth {
 }
 
 impl Kind for Birth {
-    const MUST: &'static str = "target or source";
+    const REQUIREMENT: &'static str = "target or source";
 
     fn value(self) -> Value<'static> {
         Value::Word(if self == Birth::Target { "target" } else { "source" })

@@ -5,7 +5,7 @@ use super::*;
 use crate::frame::place;
 use crate::pose::Twist;
 use crate::record::{NO_END, ray_end, ray_origin};
-use crate::team::Alone;
+use crate::team::SingleThread;
 use glam::DVec3;
 use std::vec;
 use std::vec::Vec;
@@ -42,7 +42,7 @@ fn run(profile: &Profile, rig: &Rig, pose: Pose, twist: Twist, points: &[Point])
     let mut origins = vec![[0; 4]; ORIGINS_MAX];
     let mut placed = vec![Placed::default(); points.len()];
     let (count, dropped) = Preparation::new().prepare(
-        &Alone,
+        &SingleThread,
         &Placement { profile, rig, window: &window, sweep: &sweep },
         RayBuffers {
             rays: &mut rays,

@@ -143,7 +143,7 @@ impl<'a> Cluster<'a> {
         }
         let mut mean = Mean::default();
         self.scans.targets.iter().for_each(|t| mean.include(self.all_in(t, motion)));
-        self.add_all_back(&mut mean, motion, visited);
+        self.add_all_backward(&mut mean, motion, visited);
         mean.value()
     }
 
@@ -157,7 +157,7 @@ impl<'a> Cluster<'a> {
                 continue;
             }
             let residual = self.scans.dynamic_residual(s, motion, target);
-            mean.add_times(residual, target.stride() as f32);
+            mean.add_weighted(residual, target.stride() as f32);
         }
         mean
     }
@@ -168,36 +168,36 @@ impl<'a> Cluster<'a> {
         let looked_at = self.samples.iter().step_by(target.stride());
         let count = looked_at.len() * target.stride();
         let seen = looked_at.filter_map(|s| self.scans.seen_residual(s, motion, target));
-        seen.for_each(|m| mean.add_times(m, target.stride() as f32));
+        seen.for_each(|m| mean.add_weighted(m, target.stride() as f32));
         SeenResidual { mean, visible: mean.count / count.max(1) as f32 }
     }
 
     /// Whether this share of its returns counts as most of them.
-    fn is_most(&self, visible: f32) -> bool {
+    fn is_majority(&self, visible: f32) -> bool {
         visible > self.scans.scaled.params.visible_ratio
     }
 
     /// Adds residuals of the second sweep's returns in the first.
-    fn add_all_back(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
+    fn add_all_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
             let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
             let residual = scans.residual(scans.second(), q, at, found);
             // Static structure was there before.
-            if residual < HALF_MISSED || !self.was_there(q) {
+            if residual < HALF_MISSED || !self.was_occupied(q) {
                 mean.add(residual);
             }
         }
     }
 
     /// The same from the returns that can be seen.
-    fn add_seen_back(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
+    fn add_seen_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
-            if let Some(told) = scans.told_residual(scans.second(), q, &scans.first, at) {
-                mean.add(told);
+            if let Some(decisive) = scans.decisive_residual(scans.second(), q, &scans.first, at) {
+                mean.add(decisive);
             }
         }
     }
@@ -219,11 +219,11 @@ impl<'a> Cluster<'a> {
         let rest = Motion::around(self.centre);
         let mut mean = Mean::default();
         for target in self.scans.targets {
-            if self.is_most(self.seen_in(target, motion).visible) {
+            if self.is_majority(self.seen_in(target, motion).visible) {
                 mean.include(self.seen_in(target, &rest).mean);
             }
         }
-        self.add_seen_back(&mut mean, &rest, visited);
+        self.add_seen_backward(&mut mean, &rest, visited);
         mean.value()
     }
 
@@ -239,8 +239,8 @@ impl<'a> Cluster<'a> {
     }
 
     /// The mean of those, if most returns can be seen there.
-    pub fn standing_residual(&self, in_earliest: SeenResidual) -> Option<f32> {
-        self.is_most(in_earliest.visible).then(|| in_earliest.mean.value())
+    pub fn residual_at_rest(&self, in_earliest: SeenResidual) -> Option<f32> {
+        self.is_majority(in_earliest.visible).then(|| in_earliest.mean.value())
     }
 
     /// The residual of a motion over the returns that can be seen, 0 if none can, and the share of
@@ -267,12 +267,12 @@ impl<'a> Cluster<'a> {
                 visible = seen.visible;
             }
         }
-        self.add_seen_back(&mut mean, motion, visited);
+        self.add_seen_backward(&mut mean, motion, visited);
         (mean.value(), visible)
     }
 
     /// Whether something was already where a return of the second sweep is.
-    fn was_there(&self, q: &CloudPoint) -> bool {
+    fn was_occupied(&self, q: &CloudPoint) -> bool {
         let at = self.scans.targets[0].retrace(q, &Motion::default());
         let truncation = self.scans.scaled.truncation;
         let nearest = self.scans.first.nearest(at, q.sensor, self.scans.reach_inlier());

@@ -56,8 +56,8 @@ impl Clusters {
         let of_column = self.column_cues.get(column).unwrap_or(&ColumnCues::NONE);
         match self.of(column) {
             Some(found) if found.is_dynamic => found.cues.with(*of_column),
-            Some(found) => Cues::standing(found.cues.share, of_column.could_move),
-            None => Cues::standing(0.0, 0.0),
+            Some(found) => Cues::stationary(found.cues.share, of_column.could_move),
+            None => Cues::stationary(0.0, 0.0),
         }
     }
 
@@ -98,15 +98,15 @@ impl Clusters {
         self.find_moving_parts(team, scans, flow, predicted, params.part_since_margin, |c| {
             !scans.stays(c) && history.is_new(scans.first, c, params.part_since_s)
         });
-        self.look_back(scans, history);
+        self.find_earlier_hits(scans, history);
         for found in &mut self.found {
             found.is_dynamic &= found.cues.worn <= params.worn_max;
         }
-        self.take_along(scans);
+        self.absorb_fragments(scans);
         self.complete_bodies(scans, predicted);
-        self.leave_behind(scans);
-        self.cover_ground(scans);
-        self.look_back(scans, history);
+        self.drop_immovable(scans);
+        self.include_ground(scans);
+        self.find_earlier_hits(scans, history);
         let (of_column, found) = (&self.of_column, &self.found);
         let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);
@@ -190,7 +190,7 @@ impl Clusters {
 
     /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
     /// go with these if they fit.
-    fn take_along(&mut self, scans: Scans) {
+    fn absorb_fragments(&mut self, scans: Scans) {
         let visited = &mut VisitedColumns::new();
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
@@ -244,24 +244,24 @@ impl Clusters {
     /// Takes columns that could not move out of moving clusters. A cluster consisting mostly of
     /// such columns keeps them if it was seen to come from elsewhere: something unlike anything
     /// learned may still move.
-    fn leave_behind(&mut self, scans: Scans) {
-        self.found.iter_mut().for_each(|f| f.likeness = 0);
+    fn drop_immovable(&mut self, scans: Scans) {
+        self.found.iter_mut().for_each(|f| f.similarity = 0);
         for c in 0..self.of_column.len() {
             let found = self.found.get_mut(self.of_column[c] as usize);
             if let Some(found) = found.filter(|f| f.is_dynamic) {
-                found.likeness += if scans.stays(c) { -1 } else { 1 };
+                found.similarity += if scans.stays(c) { -1 } else { 1 };
             }
         }
         for c in 0..self.of_column.len() {
             let found = self.found.get(self.of_column[c] as usize);
-            if found.is_some_and(|f| f.is_dynamic && !f.may_take(&scans, c)) {
+            if found.is_some_and(|f| f.is_dynamic && !f.may_include(&scans, c)) {
                 self.of_column[c] = NONE;
             }
         }
     }
 
     /// Finds what was hit before at the places that moving clusters came to.
-    fn look_back(&mut self, scans: Scans, history: &History) {
+    fn find_earlier_hits(&mut self, scans: Scans, history: &History) {
         let (of_column, found) = (&self.of_column, &mut self.found);
         found.iter_mut().for_each(|f| f.looks = Looks::default());
         history.find(scans.first, scans.span_s, of_column, found);
@@ -273,7 +273,7 @@ impl Clusters {
 
     /// Lets the ground below a moving cluster, where nothing else stands, go with it, unless the
     /// encoder takes it for road beside the cluster.
-    fn cover_ground(&mut self, scans: Scans) {
+    fn include_ground(&mut self, scans: Scans) {
         let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
         for c in 0..side * side {
             let found = self.found.get_mut(self.of_column[c] as usize);

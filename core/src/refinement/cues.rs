@@ -107,7 +107,7 @@ impl Cues {
     }
 
     /// Cues of something static, with this [`Cues::share`] and [`Cues::could_move`].
-    pub(super) fn standing(share: f32, could_move: f32) -> Cues {
+    pub(super) fn stationary(share: f32, could_move: f32) -> Cues {
         Cues { share, stands: 1.0, ..Cues::NONE }
             .with(ColumnCues { could_move, ..ColumnCues::NONE })
     }
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quorum_of_columns_makes_a_prior() {
+    fn a_prior_needs_a_quorum_of_columns() {
         let share = |moving| prior(moving, 0).share;
         assert_eq!(
             [share(0), share(1), share(10), share(20), share(40)],

@@ -16,7 +16,7 @@ const HISTORY: usize = 6;
 const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
 
 /// One earlier sweep.
-struct Past {
+struct PastSweep {
     /// Lattice index of the window's first voxel.
     corner: [i32; 3],
     stamp_s: f64,
@@ -25,7 +25,7 @@ struct Past {
 
 /// The sweeps before the pair's first.
 pub struct History {
-    sweeps: [Past; HISTORY],
+    sweeps: [PastSweep; HISTORY],
     /// Sweeps remembered.
     held: usize,
     /// Where the next one goes.
@@ -35,7 +35,7 @@ pub struct History {
 impl History {
     pub const fn new() -> History {
         History {
-            sweeps: [const { Past { corner: [0; 3], stamp_s: 0.0, levels: [0; COLUMNS_MAX] } };
+            sweeps: [const { PastSweep { corner: [0; 3], stamp_s: 0.0, levels: [0; COLUMNS_MAX] } };
                 HISTORY],
             held: 0,
             next: 0,
@@ -63,9 +63,9 @@ impl History {
     pub fn is_new(&self, first: DetailedCloud, column: usize, since_s: f64) -> bool {
         let levels = first.levels(column);
         let at = [column / first.side, column % first.side];
-        let old = |past: &&Past| first.stamp_s - past.stamp_s >= since_s;
+        let old = |past: &&PastSweep| first.stamp_s - past.stamp_s >= since_s;
         let mut old = self.sweeps[..self.held].iter().filter(old).peekable();
-        let unseen = |past: &Past| past.around(&first, at).is_some_and(|were| levels & were == 0);
+        let unseen = |past: &PastSweep| past.around(&first, at).is_some_and(|l| levels & l == 0);
         levels != 0 && old.peek().is_some() && old.all(unseen)
     }
 
@@ -101,7 +101,7 @@ impl History {
     }
 }
 
-impl Past {
+impl PastSweep {
     /// Levels hit in a column of a later sweep's window, widened by a level up and down because the
     /// ground is estimated anew in every sweep; `None` if the column lay outside.
     fn around(&self, later: &Cloud, at: [usize; 2]) -> Option<u32> {

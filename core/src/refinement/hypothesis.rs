@@ -28,7 +28,7 @@ const BAD_FIT_EVIDENCE: f32 = 2.0;
 
 /// A cluster without a predicted displacement whose residual at rest in the earliest sweep, by far
 /// the longest time to move in, is below this share of `residual_static` is not examined further.
-const STANDING_RATIO: f32 = 0.5;
+const STATIC_RATIO: f32 = 0.5;
 
 /// Share of looks that found nothing from which a cluster counts as seen to come. It is 0.9 in the
 /// median for clusters that move; for static ones far from any of those it is 0.2, and above 0.75
@@ -53,7 +53,7 @@ pub struct Hypothesis {
     /// Cues to whether it moves, without those of its columns.
     pub cues: Cues,
     /// How many more of its columns could move than could not, if it is dynamic.
-    pub likeness: i32,
+    pub similarity: i32,
     /// What was there before it came, if it is dynamic.
     pub looks: Looks,
     /// The ground it stands on, if it is dynamic.
@@ -68,18 +68,18 @@ impl Hypothesis {
 
     /// Whether it was seen to come and resembles nothing that could move: the encoder, which
     /// learned nothing like it, is ignored then.
-    fn is_strange(&self) -> bool {
-        self.likeness < 0 && self.came()
+    fn is_unfamiliar(&self) -> bool {
+        self.similarity < 0 && self.came()
     }
 
     /// Whether a column may go with it.
-    pub fn may_take(&self, scans: &Scans, column: usize) -> bool {
-        self.is_strange() || !scans.stays(column)
+    pub fn may_include(&self, scans: &Scans, column: usize) -> bool {
+        self.is_unfamiliar() || !scans.stays(column)
     }
 
     /// The encoder's score of what could move for one of its columns, nats; 0 if it is ignored.
     pub fn could_move(&self, scans: &Scans, column: usize) -> f32 {
-        if self.is_strange() { 0.0 } else { scans.could_move(column) }
+        if self.is_unfamiliar() { 0.0 } else { scans.could_move(column) }
     }
 }
 
@@ -194,10 +194,9 @@ pub fn test(
         return at_rest(cluster.second_residual());
     }
     let in_earliest = cluster.seen_in_earliest();
-    let standing = in_earliest.and_then(|seen| cluster.standing_residual(seen));
-    let standing = standing.filter(|residual| {
-        prior.by.is_none() && *residual < STANDING_RATIO * params.residual_static
-    });
+    let standing = in_earliest.and_then(|seen| cluster.residual_at_rest(seen));
+    let standing = standing
+        .filter(|residual| prior.by.is_none() && *residual < STATIC_RATIO * params.residual_static);
     let static_residual =
         standing.unwrap_or_else(|| cluster.static_residual(in_earliest, visited).0);
     let prior_ratio =

@@ -169,10 +169,10 @@ impl Refinement {
         let before = (i * side + j) as usize;
         let matched = (flow & VALID != 0).then(|| flow_displacement(flow).map(|d| d as f32));
         let Some(own) = inside.then(|| self.clusters.of(before)).flatten() else {
-            return Refined::at_rest(scaled, 0.0).despite(scaled, matched);
+            return Refined::at_rest(scaled, 0.0).as_static(scaled, matched);
         };
         let refined = Refined::of(scaled, own, [i as f32 + 0.5, j as f32 + 0.5]);
         let refined = Refined { cues: self.clusters.cues(before), ..refined };
-        if own.is_dynamic { refined } else { refined.despite(scaled, matched) }
+        if own.is_dynamic { refined } else { refined.as_static(scaled, matched) }
     }
 }

@@ -48,13 +48,13 @@ impl Refined {
     }
 
     /// The same, static, although its column's match, cells, may say otherwise.
-    pub fn despite(self, scaled: &Scaled, matched: Option<[f32; 2]>) -> Refined {
+    pub fn as_static(self, scaled: &Scaled, matched: Option<[f32; 2]>) -> Refined {
         self.with_alternative(matched.unwrap_or_default(), scaled.params.mismatch_variance)
     }
 
     /// A column that nothing is known about.
     pub fn nothing() -> Refined {
-        let cues = Cues::standing(0.0, 0.0);
+        let cues = Cues::stationary(0.0, 0.0);
         Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false, cues }
     }
 

@@ -44,10 +44,10 @@ pub struct Mean {
 
 impl Mean {
     pub fn add(&mut self, value: f32) {
-        self.add_times(value, 1.0);
+        self.add_weighted(value, 1.0);
     }
 
-    pub fn add_times(&mut self, value: f32, times: f32) {
+    pub fn add_weighted(&mut self, value: f32, times: f32) {
         self.sum += times * value;
         self.count += times;
     }

@@ -118,7 +118,7 @@ impl<'a> Scans<'a> {
 
     /// The same, if it can be determined.
     pub fn seen_residual(&self, s: &CloudPoint, motion: &Motion, target: &Target) -> Option<f32> {
-        self.told_residual(self.first, s, target.cloud, target.predict(s, motion))
+        self.decisive_residual(self.first, s, target.cloud, target.predict(s, motion))
     }
 
     /// Residual of a return of the first sweep in the second, if it was static; `None` if it cannot
@@ -130,7 +130,7 @@ impl<'a> Scans<'a> {
     /// Residual of a return of the cloud `of` in another if it is predicted to be `at` there. If it
     /// fits badly, what is near may be another part of its surface, and a ray must have passed to
     /// decide. A ray that was stopped earlier decides nothing.
-    pub fn told_residual(
+    pub fn decisive_residual(
         &self,
         of: DetailedCloud,
         s: &CloudPoint,

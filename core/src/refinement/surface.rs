@@ -89,7 +89,7 @@ mod tests {
     use crate::params::Profile;
 
     #[test]
-    fn a_weight_is_kept_to_a_step() {
+    fn weights_are_kept_to_within_a_step() {
         for weight in [[1.0, -0.5, 0.25, 0.7, 0.5, 1.0], [0.0, 0.0, -1.0, 1.0, 1e-6, 0.3]] {
             let words = packed(weight);
             assert!(words[0] != 0, "known");
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_told_from_a_surface() {
+    fn lines_are_distinguished_from_surfaces() {
         let line = Scaled::new(&Profile::hdl64()).surface_line;
         let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1);
         let turned = |variances: [f32; 3]| {

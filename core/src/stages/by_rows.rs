@@ -51,7 +51,7 @@ pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
 }
 
 /// See [`super::window::window`].
-pub fn least_of_window(s: &mut Storage, workers: &dyn Workers) {
+pub fn window_minima(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, simd) = (&*s.pair_cost, workers.simd());

@@ -33,7 +33,7 @@ mod tests {
     use crate::stages::COUNTERS;
 
     #[test]
-    fn what_does_not_fit_is_counted() {
+    fn overflow_is_counted() {
         let (mut index, mut list, mut counters) = ([0, 1, 1, 2, 3, 3], [9; 3], [7; COUNTERS]);
         compact(&[1, 0, 1, 1, 0, 1], &mut index, &mut list, &mut counters);
         assert_eq!((list, index), ([0, 2, 3], [0, NONE, 1, 2, NONE, NONE]));

@@ -167,7 +167,7 @@ mod tests {
             let around = WindowCosts::of(&sweep, &rank, &cost, *source);
             let mut all = [0; ROW];
             around.fill_row(&mut all);
-            assert_eq!(min_cost[n], first_of_least(&sweep, [i, j], &all));
+            assert_eq!(min_cost[n], first_minimum(&sweep, [i, j], &all));
             for d in [0, 480, 990] {
                 let mut sum = 0;
                 for w in 0..9 {
@@ -183,7 +183,7 @@ mod tests {
     }
 
     /// By examining every displacement in scan order.
-    fn first_of_least(sweep: &SweepUniform, [i, j]: [i32; 2], row: &[u16; ROW]) -> MinCost {
+    fn first_minimum(sweep: &SweepUniform, [i, j]: [i32; 2], row: &[u16; ROW]) -> MinCost {
         let outside = outside_cost(sweep, (i * sweep.side + j) as usize);
         let energies = (0..ROW as i32).filter_map(|n| {
             let d = [n / LINE as i32 - REACH, n % LINE as i32 - REACH];

@@ -52,7 +52,7 @@ fn cell(i: i32, j: i32) -> i32 {
 }
 
 #[test]
-fn a_column_beside_takes_the_tracklet_over() {
+fn an_adjacent_column_takes_over_the_tracklet() {
     for (takes_over, age) in [(true, 1), (false, 0)] {
         let mut profile = profile();
         profile.tracklet.takes_over = takes_over;
@@ -78,7 +78,7 @@ fn a_column_beside_takes_the_tracklet_over() {
 }
 
 #[test]
-fn of_several_columns_beside_the_nearest_is_taken() {
+fn the_nearest_of_several_adjacent_columns_is_taken() {
     let mut tracklets = new();
     // The point it follows ends up at the upper edge of cell (12, 10) along y.
     let (first, second) = ([2.0, 0.4], [2.0, 0.0]);
@@ -91,7 +91,7 @@ fn of_several_columns_beside_the_nearest_is_taken() {
 }
 
 #[test]
-fn what_meets_in_one_cell_becomes_the_older() {
+fn tracklets_meeting_in_a_cell_merge_into_the_older() {
     let mut tracklets = new();
     advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(10, 10), [1.0, 0.0])]);
     // The first goes on to (12, 10); the second comes there from the side.
@@ -104,7 +104,7 @@ fn what_meets_in_one_cell_becomes_the_older() {
 }
 
 #[test]
-fn what_moves_to_where_something_stands_still_moves() {
+fn a_mover_reaching_a_stationary_object_keeps_moving() {
     // Inserted before the one at rest, and after it.
     for (from, by) in [(10, 2.0), (14, -2.0)] {
         let standing = seen(cell(12, 10), [0.0, 0.0]);
@@ -151,14 +151,14 @@ fn unobserved_tracklets_wait_ever_less_sure() {
 }
 
 #[test]
-fn a_newborn_does_not_wait() {
+fn new_tracklets_do_not_coast() {
     let mut tracklets = new();
     advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(10, 10), [1.0, 0.0])]);
     assert_eq!(advance(&mut tracklets, &profile(), [0, 0], &mut []).0.lost, 1);
 }
 
 #[test]
-fn what_leaves_the_window_is_counted() {
+fn tracklets_leaving_the_window_are_counted() {
     // By its own motion.
     let mut tracklets = new();
     let outwards = &mut [seen(cell(0, 10), [-1.0, 0.0]), seen(cell(10, 30), [0.0, 0.8])];
@@ -221,7 +221,7 @@ fn counts_add_up_and_no_two_share_a_cell() {
 }
 
 #[test]
-fn beyond_the_capacity_none_are_born() {
+fn no_tracks_are_born_beyond_the_capacity() {
     let side = 255;
     let profile = Profile { side, ..Profile::hdl64() };
     let mut tracklets = new();
@@ -240,7 +240,7 @@ fn beyond_the_capacity_none_are_born() {
 }
 
 #[test]
-fn a_speed_beyond_all_cells_leaves_the_window() {
+fn speeds_beyond_all_cells_leave_the_window() {
     let profile = profile();
     let mut tracklets = new();
     let mut step_over = |dt: f32, observed: &mut [Observation]| {

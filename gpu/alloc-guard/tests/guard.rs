@@ -9,11 +9,11 @@ use std::hint::black_box;
 static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
 
 /// The section and size that a step of `section` returns.
-fn told(section: &'static str, work: impl FnOnce()) -> Option<(&'static str, usize)> {
-    tell(&mut Sealed::new(section, ()), work)
+fn reported(section: &'static str, work: impl FnOnce()) -> Option<(&'static str, usize)> {
+    report(&mut Sealed::new(section, ()), work)
 }
 
-fn tell(sealed: &mut Sealed<()>, work: impl FnOnce()) -> Option<(&'static str, usize)> {
+fn report(sealed: &mut Sealed<()>, work: impl FnOnce()) -> Option<(&'static str, usize)> {
     let step = sealed.step(|()| {
         work();
         Ok::<_, Allocation>(())
@@ -28,37 +28,37 @@ fn allocate(bytes: usize) {
 #[test]
 fn a_step_returns_the_first_allocation_in_it() {
     allocate(3);
-    assert_eq!(told("a", || ()), None);
-    assert_eq!(told("a", || allocate(5)), Some(("a", 5)));
+    assert_eq!(reported("a", || ()), None);
+    assert_eq!(reported("a", || allocate(5)), Some(("a", 5)));
     let mut grown = Vec::with_capacity(1);
     let both = || {
         grown.extend([1u64, 2]);
         allocate(5);
     };
-    assert_eq!(told("grows", both), Some(("grows", 32)));
-    assert_eq!(told("zeroes", || drop(black_box(vec![0u8; 6]))), Some(("zeroes", 6)));
-    assert_eq!(told("frees", || drop(grown)), None);
+    assert_eq!(reported("grows", both), Some(("grows", 32)));
+    assert_eq!(reported("zeroes", || drop(black_box(vec![0u8; 6]))), Some(("zeroes", 6)));
+    assert_eq!(reported("frees", || drop(grown)), None);
 
     let inner = || {
         watch("inner", || ());
         allocate(7);
     };
-    assert_eq!(told("outer", || watch("inner", || allocate(7))), Some(("inner", 7)));
-    assert_eq!(told("outer", inner), Some(("outer", 7)));
+    assert_eq!(reported("outer", || watch("inner", || allocate(7))), Some(("inner", 7)));
+    assert_eq!(reported("outer", inner), Some(("outer", 7)));
 
     let unwound =
         std::panic::catch_unwind(|| watch("w", || std::panic::resume_unwind(Box::new(0))));
     assert!(unwound.is_err());
     allocate(8);
-    assert_eq!(told("after unwinding", || ()), None);
+    assert_eq!(reported("after unwinding", || ()), None);
 
     let help = || std::thread::spawn(|| watch("helper", || allocate(9))).join().expect("no panic");
     help();
     let mut sealed = Sealed::new("a", ());
-    assert_eq!(tell(&mut sealed, || ()), None, "set-up");
+    assert_eq!(report(&mut sealed, || ()), None, "set-up");
     help();
-    assert_eq!(tell(&mut sealed, || ()), Some(("helper", 9)));
-    assert_eq!(tell(&mut sealed, || ()), None);
+    assert_eq!(report(&mut sealed, || ()), Some(("helper", 9)));
+    assert_eq!(report(&mut sealed, || ()), None);
 
     let mut sealed = Sealed::new("a", 1);
     let failed = sealed.step(|value| {
@@ -69,11 +69,11 @@ fn a_step_returns_the_first_allocation_in_it() {
     assert!(matches!(failed, Err(Failed::OfItself)) && *sealed == 2);
     assert!(sealed.step(|_| Ok::<_, Failed>(())).is_ok());
     assert_eq!(sealed.finish(), 2);
-    let told = Sealed::new("b", ()).step(|()| {
+    let reported = Sealed::new("b", ()).step(|()| {
         allocate(4);
         Ok(())
     });
-    let Err(Failed::Allocation(e)) = told else { panic!("not told") };
+    let Err(Failed::Allocation(e)) = reported else { panic!("not reported") };
     let text = e.to_string();
     assert!(text.starts_with("4 bytes allocated in the section `b`"), "{text}");
 }

@@ -13,7 +13,7 @@ const DUMP_STATS_AT: usize = (b'C' as usize) << 24 | (b'T' as usize) << 16 | 3;
 
 /// Whether Valgrind is watching; always false on processors other than x86-64, where it is not
 /// asked.
-pub fn is_watched() -> bool {
+pub fn is_under_valgrind() -> bool {
     // SAFETY: it has no argument.
     unsafe { request(RUNNING_ON_VALGRIND, core::ptr::null()) != 0 }
 }
@@ -57,11 +57,11 @@ mod tests {
     /// A register not as it was before, or a word that was written to, would show in the values
     /// kept around it.
     #[test]
-    fn nothing_changes_where_nobody_watches() {
+    fn nothing_changes_without_a_viewer() {
         let around: [u64; 16] = core::array::from_fn(|n| u64::MAX / (n as u64 + 1));
         let kept = core::hint::black_box(around);
         (0..1000).for_each(|_| dump(c"stage"));
-        assert!(!is_watched());
+        assert!(!is_under_valgrind());
         assert_eq!(core::hint::black_box(kept), around);
     }
 }

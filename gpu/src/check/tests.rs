@@ -45,7 +45,7 @@ fn dispatch(kernel: &'static Kernel, buffers: &[usize], groups: Groups) -> Op {
 }
 
 /// The objection to a program of these steps; empty if they are fine.
-fn said(ops: &[Op]) -> String {
+fn objection(ops: &[Op]) -> String {
     let program = Program { name: "p", ops: ops.to_vec() };
     match schedule(&LIMITS, &TABLE, &[program]) {
         Ok(()) => String::new(),
@@ -67,7 +67,7 @@ fn sound_programs_pass() {
         dispatch(&GOOD, &[1, 2], one),
         dispatch(&GOOD, &[0, 1], indirect),
     ];
-    assert_eq!(said(&ops), "");
+    assert_eq!(objection(&ops), "");
 }
 
 #[test]
@@ -92,8 +92,8 @@ fn unsound_programs_are_refused_with_the_reason() {
         (dispatch(&GOOD, &[1, 2], indirect(u64::MAX - 3)), "of small"),
     ];
     for (op, reason) in cases {
-        let said = said(std::slice::from_ref(&op));
-        assert!(said.contains(reason), "{op:?}: {said:?}");
+        let objection = objection(std::slice::from_ref(&op));
+        assert!(objection.contains(reason), "{op:?}: {objection:?}");
     }
 }
 

@@ -10,7 +10,7 @@ use raywake_embed::{EstimatorOptions, FlowEstimator, Memory, TeamEstimator};
 
 use crate::RAYWAKE_ABI_VERSION;
 use crate::handle::Handle;
-use crate::status::{CallStatus, ErrorText, Refusal, put, told};
+use crate::status::{CallStatus, ErrorText, Refusal, put, report};
 
 /// A rigid transform `target_from_source`.
 #[repr(C)]
@@ -90,11 +90,11 @@ unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<Option<&'a str>, R
 
 /// Sets a parameter by `NAME=VALUE`.
 fn assign(profile: &mut Profile, setting: &str) -> Result<(), Refusal> {
-    let refuse = |is, must| Refusal::invalid(format_args!("`{setting}`: {is}{must}"));
+    let refuse = |is, requirement| Refusal::invalid(format_args!("`{setting}`: {is}{requirement}"));
     let to = ParameterSetting::parse(setting).ok_or_else(|| refuse("it must be ", "NAME=VALUE"))?;
     profile.assign(&to).map_err(|e| match e {
         AssignError::Unknown => refuse("there is no such parameter", ""),
-        AssignError::Must(must) => refuse("it must be ", must),
+        AssignError::WrongType(requirement) => refuse("it must be ", requirement),
     })
 }
 
@@ -241,7 +241,7 @@ pub unsafe extern "C" fn raywake_memory_needed(
     let found = unsafe { CreateOptions::read(options) }.and_then(|(options, _)| needed(&options));
     let result = found.and_then(|found| unsafe { put(found, bytes, "bytes") });
     // SAFETY: guaranteed by the caller.
-    unsafe { told(result, error) }
+    unsafe { report(result, error) }
 }
 
 /// Creates an estimator in the caller's memory, which is the library's until `raywake_destroy`.
@@ -271,5 +271,5 @@ pub unsafe extern "C" fn raywake_create(
     // SAFETY: guaranteed by the caller.
     let result = made.and_then(|handle| unsafe { put(handle, estimator, "estimator") });
     // SAFETY: guaranteed by the caller.
-    unsafe { told(result, error) }
+    unsafe { report(result, error) }
 }

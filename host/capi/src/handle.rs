@@ -18,7 +18,7 @@ pub struct Handle {
 }
 
 /// Exclusive use of an estimator, until this is dropped.
-pub(crate) struct Turn(NonNull<Handle>);
+pub(crate) struct ExclusiveUse(NonNull<Handle>);
 
 impl Handle {
     /// Number of bytes it takes, at any alignment.
@@ -41,7 +41,7 @@ impl Handle {
 
     /// # Safety
     /// `handle` is null, or was an estimator once and its memory still exists.
-    pub(crate) unsafe fn enter(handle: *mut Handle) -> Result<Turn, Refusal> {
+    pub(crate) unsafe fn enter(handle: *mut Handle) -> Result<ExclusiveUse, Refusal> {
         let place = NonNull::new(handle).ok_or_else(|| Refusal::null("estimator"))?;
         let not_created = || Refusal::new(CallStatus::NotCreated, "there is no estimator here");
         if !place.is_aligned() {
@@ -57,18 +57,18 @@ impl Handle {
         if busy.swap(true, Ordering::Acquire) {
             return Err(Refusal::new(CallStatus::Busy, "another thread is in a call"));
         }
-        Ok(Turn(place))
+        Ok(ExclusiveUse(place))
     }
 }
 
-impl Turn {
+impl ExclusiveUse {
     pub(crate) fn team(&mut self) -> &mut TeamEstimator {
         // SAFETY: `busy` keeps all others out.
         unsafe { &mut (*self.0.as_ptr()).team }
     }
 }
 
-impl Drop for Turn {
+impl Drop for ExclusiveUse {
     fn drop(&mut self) {
         // SAFETY: as above.
         unsafe { (*self.0.as_ptr()).busy.store(false, Ordering::Release) }

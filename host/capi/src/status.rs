@@ -141,7 +141,7 @@ pub(crate) unsafe fn put<T>(value: T, to: *mut T, what: &str) -> Result<(), Refu
 ///
 /// # Safety
 /// `error` is null or writable.
-pub(crate) unsafe fn told(result: Result<(), Refusal>, error: *mut ErrorText) -> CallStatus {
+pub(crate) unsafe fn report(result: Result<(), Refusal>, error: *mut ErrorText) -> CallStatus {
     let (status, why) = match result {
         Ok(()) => (CallStatus::Ok, ErrorText::EMPTY),
         Err(refusal) => (refusal.status, refusal.why),

@@ -7,11 +7,11 @@ use raywake_core::continuity::Reset;
 use raywake_core::pose::Twist;
 use raywake_core::sweep::Point;
 use raywake_embed::{StepSummary, SweepPlace};
-use raywake_registration::odometry::Locating;
+use raywake_registration::odometry::PoseStatus;
 
 use crate::create::CPose;
 use crate::handle::Handle;
-use crate::status::{CallStatus, ErrorText, Refusal, put, told};
+use crate::status::{CallStatus, ErrorText, Refusal, put, report};
 
 /// Velocity of the vehicle, along its own axes.
 #[repr(C)]
@@ -220,13 +220,13 @@ const fn reset_code(reset: Option<Reset>) -> u32 {
     }
 }
 
-const fn pose_code(locating: Option<Locating>) -> u32 {
-    match locating {
+const fn pose_code(pose_status: Option<PoseStatus>) -> u32 {
+    match pose_status {
         None => RAYWAKE_POSE_GIVEN,
-        Some(Locating::Start) => RAYWAKE_POSE_START,
-        Some(Locating::Registered) => RAYWAKE_POSE_REGISTERED,
-        Some(Locating::Degenerate) => RAYWAKE_POSE_DEGENERATE,
-        Some(Locating::Lost) => RAYWAKE_POSE_LOST,
+        Some(PoseStatus::Start) => RAYWAKE_POSE_START,
+        Some(PoseStatus::Registered) => RAYWAKE_POSE_REGISTERED,
+        Some(PoseStatus::Degenerate) => RAYWAKE_POSE_DEGENERATE,
+        Some(PoseStatus::Lost) => RAYWAKE_POSE_LOST,
     }
 }
 
@@ -251,7 +251,7 @@ impl StepResult {
             own_vehicle: dropped.own_vehicle,
             unrefined: summary.unrefined as u64,
             reset: reset_code(summary.reset),
-            pose_from: pose_code(summary.locating),
+            pose_from: pose_code(summary.pose_status),
             world_from_vehicle: CPose::from(&summary.pose),
         }
     }
@@ -291,6 +291,6 @@ pub unsafe extern "C" fn raywake_step(
             true => Ok(()),
             false => put(found, result, "result"),
         });
-        told(stepped, error)
+        report(stepped, error)
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use cbindgen::{Builder, Config};
 
 #[test]
-fn the_header_is_what_the_code_says() {
+fn the_header_matches_the_code() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = Config::from_file(here.join("cbindgen.toml")).unwrap();
     let sources = ["src/lib.rs", "../embed/src/records.rs"].map(|file| here.join(file));

@@ -4,7 +4,7 @@ use raywake_core::digest::Digest;
 use raywake_core::encoder::{self, EncoderWeights};
 use raywake_core::output::{ColumnFlow, KeptPoints, Output, PointFlows, ReturnFlow, TrackletState};
 use raywake_core::params::{Profile, SOLID_MAX};
-use raywake_core::perceive::{Machine, ScalarBackend};
+use raywake_core::perceive::{ScalarBackend, StepContext};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::prepare::{Preparation, Setup};
@@ -14,7 +14,7 @@ use raywake_core::weights::WeightsError;
 use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 use raywake_registration::Odometry;
-use raywake_registration::odometry::Locating;
+use raywake_registration::odometry::PoseStatus;
 
 use crate::memory::{AtRest, Memory, array, bytes_of, state};
 use crate::options::{CreateError, EstimatorOptions};
@@ -51,21 +51,21 @@ pub struct FlowEstimator {
     columns: &'static mut [ColumnFlow],
     taken: &'static mut [ReturnFlow],
     /// Returns of the last sweep, and of the previous one.
-    sweeps: [SweepRoom; 2],
+    sweeps: [SweepBuffers; 2],
     pair: Option<KeptPair>,
-    before: Option<Before>,
+    before: Option<LastSweep>,
 }
 
 /// When, where and how fast the last sweep was.
 #[derive(Clone, Copy)]
-struct Before {
+struct LastSweep {
     stamp_s: f64,
     pose: Pose,
     twist: Twist,
 }
 
 /// Returns of a sweep.
-struct SweepRoom {
+struct SweepBuffers {
     points: &'static mut [Point],
     count: usize,
 }
@@ -95,9 +95,9 @@ impl EstimatorOptions {
     }
 }
 
-impl SweepRoom {
-    fn new(memory: &mut Memory, most: usize) -> Option<SweepRoom> {
-        Some(SweepRoom { points: array(memory, most, Point::default())?, count: 0 })
+impl SweepBuffers {
+    fn new(memory: &mut Memory, most: usize) -> Option<SweepBuffers> {
+        Some(SweepBuffers { points: array(memory, most, Point::default())?, count: 0 })
     }
 
     fn points(&self) -> &[Point] {
@@ -136,7 +136,7 @@ impl FlowEstimator {
         let words = array(rest, words(profile), 0).ok_or_else(lacking)?;
         let columns = array(rest, solid(profile), ColumnFlow::default()).ok_or_else(lacking)?;
         let taken = array(rest, profile.returns(), ReturnFlow::default()).ok_or_else(lacking)?;
-        let mut room = || SweepRoom::new(rest, *points_max).ok_or_else(lacking);
+        let mut room = || SweepBuffers::new(rest, *points_max).ok_or_else(lacking);
         let sweeps = [room()?, room()?];
         let (backend, scores) =
             ScalarBackend::shipped(words, profile).map_err(CreateError::Weights)?;
@@ -186,7 +186,7 @@ impl FlowEstimator {
         self.admit(place, points.len())?;
         self.pair = None;
         self.sweeps.swap(0, 1);
-        let SweepRoom { points: room, count } = &mut self.sweeps[0];
+        let SweepBuffers { points: room, count } = &mut self.sweeps[0];
         // An iterator with a wrong length yields what it has, as far as there is room.
         *count = room.iter_mut().zip(points).map(|(to, point)| *to = point).count();
         Ok(())
@@ -194,26 +194,26 @@ impl FlowEstimator {
 
     /// Does the work for the sweep received.
     pub(crate) fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
-        let (pose, twist, locating) = self.locate(place);
+        let (pose, twist, pose_status) = self.locate(place);
         let [now, before] = &self.sweeps;
         let sweep =
             Sweep { stamp_s: place.stamp_s, points: now.points(), world_from_vehicle: pose, twist };
-        let machine = Machine { backend: &mut self.backend, team, timer: &mut () };
+        let machine = StepContext { backend: &mut self.backend, team, timer: &mut () };
         let room = Output { columns: self.columns, points: self.taken };
         let step = self.pipeline.step(&self.setup, machine, &sweep, before.points(), room);
         let output = step.unwrap_or_else(|never| match never {});
         if let (Some(objects), Some(last)) = (&mut self.objects, self.before) {
-            let Before { stamp_s, pose: world_from_vehicle, twist } = last;
+            let LastSweep { stamp_s, pose: world_from_vehicle, twist } = last;
             let sweep = Sweep { stamp_s, points: before.points(), world_from_vehicle, twist };
             let flows = output.flows.as_ref().map(|flows| (flows.points, &self.setup.profile));
             objects.step(&TrackingParams::DEFAULT, &self.setup.rig, &sweep, flows);
         }
         let objects = self.objects.as_ref().map_or(0, |objects| objects.objects().len());
-        let summary = StepSummary::new(&output, pose, locating, objects);
+        let summary = StepSummary::new(&output, pose, pose_status, objects);
         self.pair = output
             .flows
             .map(|flows| KeptPair { columns: flows.columns.len(), points: flows.points.keep() });
-        self.before = Some(Before { stamp_s: place.stamp_s, pose, twist });
+        self.before = Some(LastSweep { stamp_s: place.stamp_s, pose, twist });
         summary
     }
 
@@ -225,16 +225,16 @@ impl FlowEstimator {
         if place.pose.is_some() == self.odometry.is_some() {
             return Err(SweepError::Pose);
         }
-        if place.is_sound() { Ok(()) } else { Err(SweepError::NotFinite) }
+        if place.is_valid() { Ok(()) } else { Err(SweepError::NotFinite) }
     }
 
     /// Pose and twist of the sweep just received.
-    fn locate(&mut self, place: &SweepPlace) -> (Pose, Twist, Option<Locating>) {
+    fn locate(&mut self, place: &SweepPlace) -> (Pose, Twist, Option<PoseStatus>) {
         let stamp_s = place.stamp_s;
         if let Some(odometry) = &mut self.odometry {
             place.twist.into_iter().for_each(|twist| odometry.expect(twist));
             let found = odometry.locate(stamp_s, self.sweeps[0].points(), &self.setup.rig);
-            return (found.world_from_vehicle, found.twist, Some(found.locating));
+            return (found.world_from_vehicle, found.twist, Some(found.pose_status));
         }
         let pose = normalised(place.pose.unwrap_or(Pose::IDENTITY));
         let steady = self.before.filter(|before| {

@@ -40,7 +40,9 @@ pub enum CreateError {
 impl fmt::Display for CreateError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            CreateError::Profile(e) => write!(f, "parameter `{}` must be {}", e.field, e.must),
+            CreateError::Profile(e) => {
+                write!(f, "parameter `{}` must be {}", e.field, e.requirement)
+            }
             CreateError::Rig => write!(f, "the rig needs a sensor, and finite positions and times"),
             CreateError::Weights(why) => {
                 write!(f, "the shipped weights do not fit the profile: {why}")
@@ -54,7 +56,7 @@ impl EstimatorOptions {
     /// Checks that such an estimator is possible.
     pub(crate) fn check(&self) -> Result<(), CreateError> {
         self.profile.check().map_err(CreateError::Profile)?;
-        if !is_sound(&self.rig) {
+        if !is_valid(&self.rig) {
             return Err(CreateError::Rig);
         }
         // No sweep has this many returns; and sums of bytes do not overflow.
@@ -65,9 +67,9 @@ impl EstimatorOptions {
     }
 }
 
-fn is_sound(rig: &Rig) -> bool {
+fn is_valid(rig: &Rig) -> bool {
     let places = !rig.sensors.is_empty() && rig.sensors.iter().all(is_pose);
-    places && rig.timing.is_sound() && rig.ground_m.is_finite() && is_box(rig)
+    places && rig.timing.is_valid() && rig.ground_m.is_finite() && is_box(rig)
 }
 
 fn is_box(rig: &Rig) -> bool {

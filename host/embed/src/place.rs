@@ -42,7 +42,7 @@ impl fmt::Display for SweepError {
 
 impl SweepPlace {
     /// Whether its numbers are valid.
-    pub(crate) fn is_sound(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         let moves = self.twist.unwrap_or(Twist::ZERO);
         self.stamp_s.is_finite()
             && self.pose.iter().all(is_pose)

@@ -5,7 +5,7 @@ use raywake_core::dropped::DroppedReturns;
 use raywake_core::output::{PairFlows, SweepOutput};
 use raywake_core::pose::Pose;
 use raywake_core::tracklet::TrackletTurnover;
-use raywake_registration::odometry::Locating;
+use raywake_registration::odometry::PoseStatus;
 
 /// Summary of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct StepSummary {
     /// `world_from_vehicle` at the stamp.
     pub pose: Pose,
     /// How it was found, unless it was given.
-    pub locating: Option<Locating>,
+    pub pose_status: Option<PoseStatus>,
     /// Objects in the previous sweep.
     pub objects: usize,
 }
@@ -51,7 +51,7 @@ impl StepSummary {
     pub(crate) fn new(
         output: &SweepOutput,
         pose: Pose,
-        locating: Option<Locating>,
+        pose_status: Option<PoseStatus>,
         objects: usize,
     ) -> StepSummary {
         StepSummary {
@@ -62,7 +62,7 @@ impl StepSummary {
             foreground: output.foreground,
             rays: output.rays,
             pose,
-            locating,
+            pose_status,
             objects,
         }
     }

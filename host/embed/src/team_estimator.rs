@@ -38,7 +38,7 @@ impl std::error::Error for StepError {}
 
 /// An estimator and the threads that share its work. Any thread may give it sweeps.
 pub struct TeamEstimator {
-    desk: Arc<Desk>,
+    exchange: Arc<Exchange>,
     threads: Vec<JoinHandle<()>>,
     pool: Option<ThreadPool>,
     /// The estimator's memory, unless it is the caller's. Dropped last.
@@ -55,7 +55,7 @@ pub enum TeamError {
 }
 
 /// Where the caller and the team's leader meet.
-struct Desk {
+struct Exchange {
     work: Mutex<Work>,
     changed: Condvar,
 }
@@ -91,10 +91,10 @@ impl TeamEstimator {
     /// # Errors
     /// The system has no more threads.
     pub fn new(estimator: FlowEstimator, threads: usize) -> io::Result<TeamEstimator> {
-        let threads = paying(threads);
+        let threads = worthwhile_threads(threads);
         let work = Work { estimator, order: StepOrder::None, failed: false };
-        let desk = Arc::new(Desk { work: Mutex::new(work), changed: Condvar::new() });
-        let mut made = TeamEstimator { desk, threads: Vec::new(), pool: None, memory: None };
+        let exchange = Arc::new(Exchange { work: Mutex::new(work), changed: Condvar::new() });
+        let mut made = TeamEstimator { exchange, threads: Vec::new(), pool: None, memory: None };
         if threads > 1 {
             made.gather(threads)?;
         }
@@ -126,8 +126,8 @@ impl TeamEstimator {
         let pool = pool.build().map_err(io::Error::other)?;
         // Triggers what a thread allocates when it first looks for work.
         pool.broadcast(|_| ());
-        let desk = self.desk.clone();
-        pool.spawn(move || desk.lead());
+        let exchange = self.exchange.clone();
+        pool.spawn(move || exchange.lead());
         self.pool = Some(pool);
         Ok(())
     }
@@ -146,14 +146,14 @@ impl TeamEstimator {
         place: &SweepPlace,
         points: impl ExactSizeIterator<Item = Point>,
     ) -> Result<StepSummary, StepError> {
-        let mut work = self.desk.work();
+        let mut work = self.exchange.work();
         if work.failed {
             return Err(StepError::Failed);
         }
         work.estimator.receive(place, points).map_err(StepError::Sweep)?;
         match self.pool {
             None => work.step(place),
-            Some(_) => self.desk.order(work, place),
+            Some(_) => self.exchange.order(work, place),
         }
     }
 
@@ -162,7 +162,7 @@ impl TeamEstimator {
     /// # Errors
     /// A step failed.
     pub fn read<R>(&self, read: impl FnOnce(&FlowEstimator) -> R) -> Result<R, StepError> {
-        let work = self.desk.work();
+        let work = self.exchange.work();
         if work.failed {
             return Err(StepError::Failed);
         }
@@ -171,14 +171,14 @@ impl TeamEstimator {
 }
 
 /// The number asked for, or as many as pay off; at most `THREADS_MAX`.
-fn paying(asked: usize) -> usize {
+fn worthwhile_threads(asked: usize) -> usize {
     match asked {
         0 => raywake_team::available(),
         n => n.min(raywake_team::THREADS_MAX),
     }
 }
 
-impl Desk {
+impl Exchange {
     fn work(&self) -> MutexGuard<'_, Work> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -234,8 +234,8 @@ impl Work {
 impl Drop for TeamEstimator {
     /// Waits for all threads to end: the code they run may be unloaded next.
     fn drop(&mut self) {
-        self.desk.work().order = StepOrder::Quit;
-        self.desk.changed.notify_all();
+        self.exchange.work().order = StepOrder::Quit;
+        self.exchange.changed.notify_all();
         self.pool = None;
         // A thread that panicked has ended, too.
         self.threads.drain(..).for_each(|thread| drop(thread.join()));

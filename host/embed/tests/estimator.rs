@@ -8,7 +8,7 @@ use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
-use raywake_core::team::Alone;
+use raywake_core::team::SingleThread;
 use raywake_embed::{
     CreateError, EstimatorOptions, FlowEstimator, Memory, ObjectRecord, StepError, SweepError,
     SweepPlace, TeamEstimator,
@@ -53,7 +53,7 @@ fn threads_change_nothing() {
     let mut alone = estimator(&options());
     let mut expected = Digest::default();
     for sweep in sweeps() {
-        alone.step(&Alone, &place(sweep), sweep.points.iter().copied()).unwrap();
+        alone.step(&SingleThread, &place(sweep), sweep.points.iter().copied()).unwrap();
         alone.add_to(&mut expected);
     }
     assert!(alone.columns().iter().any(|c| c.velocity_world_mps != [0.0; 2]));
@@ -88,9 +88,9 @@ fn objects_are_followed() {
     let mut digests = [Digest::default(); 2];
     for sweep in sweeps() {
         let points = || sweep.points.iter().copied();
-        let found = plain.step(&Alone, &place(sweep), points()).unwrap();
+        let found = plain.step(&SingleThread, &place(sweep), points()).unwrap();
         assert_eq!((found.objects, plain.objects()), (0, &[][..]));
-        let found = alone.step(&Alone, &place(sweep), points()).unwrap();
+        let found = alone.step(&SingleThread, &place(sweep), points()).unwrap();
         assert_eq!(found.objects, alone.objects().len());
         plain.add_to(&mut digests[0]);
         alone.add_to(&mut digests[1]);
@@ -112,20 +112,20 @@ fn poses_are_found_and_twists_follow_from_poses() {
     for sweep in sweeps() {
         let points = || sweep.points.iter().copied();
         let here = SweepPlace { stamp_s: sweep.stamp_s, ..SweepPlace::default() };
-        let found = finding.step(&Alone, &here, points()).unwrap();
-        assert!(found.locating.is_some());
+        let found = finding.step(&SingleThread, &here, points()).unwrap();
+        assert!(found.pose_status.is_some());
         let first = sweeps()[0].world_from_vehicle;
         let off = (first.inverse() * sweep.world_from_vehicle).inverse() * found.pose;
         assert!(off.translation.length() < 0.1, "{off:?}");
         let with_pose = SweepPlace { pose: Some(sweep.world_from_vehicle), ..here };
-        let made = given.step(&Alone, &with_pose, points()).unwrap();
-        assert_eq!((made.pose, made.locating), (sweep.world_from_vehicle, None));
+        let made = given.step(&SingleThread, &with_pose, points()).unwrap();
+        assert_eq!((made.pose, made.pose_status), (sweep.world_from_vehicle, None));
         assert_eq!(made.pair.is_some(), made.reset.is_none());
     }
 }
 
 #[test]
-fn memory_is_as_large_as_said() {
+fn memory_is_as_large_as_stated() {
     let all = EstimatorOptions { registers: true, objects: true, points_max: 1, ..options() };
     for options in [options(), all] {
         let bytes = options.bytes().unwrap();
@@ -139,7 +139,7 @@ fn memory_is_as_large_as_said() {
 }
 
 #[test]
-fn what_is_no_set_of_options() {
+fn invalid_sets_of_options() {
     let refused = |change: &dyn Fn(&mut EstimatorOptions)| {
         let mut options = options();
         change(&mut options);
@@ -164,7 +164,7 @@ fn what_is_no_set_of_options() {
 }
 
 /// Gives an estimator one invalid sweep after another.
-fn pester(estimator: &mut FlowEstimator, here: SweepPlace, points: &[Point]) {
+fn give_invalid_sweeps(estimator: &mut FlowEstimator, here: SweepPlace, points: &[Point]) {
     let far = Some(Pose { translation: glam::DVec3::NAN, ..Pose::IDENTITY });
     let odd = Some(Pose { rotation: glam::DQuat::IDENTITY * 2.0, ..Pose::IDENTITY });
     let fast = Some(Twist { linear: glam::DVec3::INFINITY, ..Twist::ZERO });
@@ -175,22 +175,22 @@ fn pester(estimator: &mut FlowEstimator, here: SweepPlace, points: &[Point]) {
         (SweepPlace { twist: fast, ..here }, SweepError::NotFinite),
         (SweepPlace { pose: None, ..here }, SweepError::Pose),
     ] {
-        assert_eq!(estimator.step(&Alone, &place, points.iter().copied()), Err(why));
+        assert_eq!(estimator.step(&SingleThread, &place, points.iter().copied()), Err(why));
     }
     let many = std::iter::repeat_n(Point::default(), 150_001);
-    assert_eq!(estimator.step(&Alone, &here, many), Err(SweepError::Points(150_000)));
+    assert_eq!(estimator.step(&SingleThread, &here, many), Err(SweepError::Points(150_000)));
 }
 
 #[test]
-fn a_sweep_that_is_none_leaves_all_as_it_was() {
+fn an_invalid_sweep_changes_nothing() {
     let digests = [false, true].map(|pestered| {
         let mut estimator = estimator(&options());
         let mut digest = Digest::default();
         for sweep in sweeps() {
             if pestered {
-                pester(&mut estimator, place(sweep), &sweep.points);
+                give_invalid_sweeps(&mut estimator, place(sweep), &sweep.points);
             }
-            estimator.step(&Alone, &place(sweep), sweep.points.iter().copied()).unwrap();
+            estimator.step(&SingleThread, &place(sweep), sweep.points.iter().copied()).unwrap();
             estimator.add_to(&mut digest);
         }
         digest

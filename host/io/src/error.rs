@@ -47,7 +47,7 @@ impl Error {
     }
 
     /// [`Error::Unsupported`] because a feature is not compiled in.
-    pub fn lacking(what: impl std::fmt::Display, feature: &str) -> Error {
+    pub fn missing_feature(what: impl std::fmt::Display, feature: &str) -> Error {
         let text = format!(
             "{what} needs the feature `{feature}`, which is not compiled in: build raywake with \
              --all-features"

@@ -18,7 +18,7 @@ use crate::recording::failed;
 pub fn main(py: Python<'_>, args: Vec<String>) -> u8 {
     py.detach(|| {
         let line = Args::command().try_get_matches_from(args);
-        line.and_then(|line| raywake::carry_out(&line)).unwrap_or_else(|e| {
+        line.and_then(|line| raywake::run_command_line(&line)).unwrap_or_else(|e| {
             // If this cannot be printed, nothing can.
             let _ = e.print();
             e.exit_code() as u8

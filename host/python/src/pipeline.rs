@@ -3,7 +3,7 @@
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use raywake::statistics::in_words;
+use raywake::statistics::describe_reset;
 use raywake_core::digest::Digest;
 use raywake_core::params::{AssignError, ParameterSetting, Profile, Value};
 use raywake_core::sweep::Point;
@@ -12,7 +12,7 @@ use raywake_embed::{
     StepError, StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
 };
 
-use raywake_registration::odometry::Locating;
+use raywake_registration::odometry::PoseStatus;
 
 use crate::arrays::{self, array};
 use crate::poses::{matrix, pose, twist};
@@ -66,7 +66,9 @@ fn set(profile: &mut Profile, path: &str, value: &Bound<'_, PyAny>) -> PyResult<
     };
     profile.assign(&ParameterSetting::new(path, value)).map_err(|e| match e {
         AssignError::Unknown => PyValueError::new_err(format!("there is no parameter {path:?}")),
-        AssignError::Must(must) => PyValueError::new_err(format!("{path} must be {must}")),
+        AssignError::WrongType(requirement) => {
+            PyValueError::new_err(format!("{path} must be {requirement}"))
+        }
     })
 }
 
@@ -262,7 +264,7 @@ impl Step {
     /// "spin"; None if it does.
     #[getter]
     fn reset(&self) -> Option<&'static str> {
-        self.summary.reset.map(|reset| in_words(reset).0)
+        self.summary.reset.map(|reset| describe_reset(reset).0)
     }
 
     /// world_from_vehicle of this sweep, 4x4.
@@ -274,7 +276,7 @@ impl Step {
     /// How the pose was found: "start", "registered", "degenerate" or "lost"; None if it was given.
     #[getter]
     fn located(&self) -> Option<&'static str> {
-        self.summary.locating.map(Locating::name)
+        self.summary.pose_status.map(PoseStatus::name)
     }
 
     /// Returns of this sweep that were left out, by reason.

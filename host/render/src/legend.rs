@@ -64,7 +64,7 @@ fn sign_width(sign: &Sign, look: &Look) -> f32 {
         Sign::Ramp(_, [low, high]) => {
             RAMP + 2.0 * SPACE + text::width(low, SIZE) + text::width(high, SIZE)
         }
-        Sign::Arrow(arrow) => pixels(look, arrow.way[0].abs()).max(SIGN),
+        Sign::Arrow(arrow) => pixels(look, arrow.vector[0].abs()).max(SIGN),
         Sign::Cell(_) => CELL,
         Sign::Outline(_) | Sign::Line(_) => SIGN,
     }
@@ -79,7 +79,7 @@ fn draw_sign(canvas: &mut Canvas, sign: &Sign, look: &Look, [x, y]: [f32; 2]) {
     match sign {
         Sign::Ramp(colours, ends) => draw_ramp(canvas, colours, ends, [x, y]),
         Sign::Arrow(arrow) => {
-            let long = pixels(look, arrow.way[0].abs());
+            let long = pixels(look, arrow.vector[0].abs());
             draw_arrow(canvas, [x, y], [x + long, y], arrow.width, arrow.colour);
         }
         Sign::Cell(colour) => {

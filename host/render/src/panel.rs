@@ -152,7 +152,7 @@ impl PanelView<'_> {
 
     fn draw_arrow(&self, canvas: &mut Canvas, from: [f32; 2], arrow: &Arrow) {
         let Some(a) = self.seen(from) else { return };
-        let b = self.at([from[0] + arrow.way[0], from[1] + arrow.way[1]]);
+        let b = self.at([from[0] + arrow.vector[0], from[1] + arrow.vector[1]]);
         draw_arrow(canvas, a, b, arrow.width, arrow.colour);
     }
 
@@ -222,13 +222,13 @@ pub(crate) fn draw_arrow(
     width: f32,
     colour: Colour,
 ) {
-    let way = [b[0] - a[0], b[1] - a[1]];
+    let vector = [b[0] - a[0], b[1] - a[1]];
     // Not `hypot`, which differs between platforms.
-    let long = (way[0] * way[0] + way[1] * way[1]).sqrt();
+    let long = (vector[0] * vector[0] + vector[1] * vector[1]).sqrt();
     if long.is_nan() || long < 1.5 {
         return;
     }
-    let along = way.map(|v| v / long);
+    let along = vector.map(|v| v / long);
     let size = (3.0 + 2.6 * width).min(long);
     let neck = [b[0] - along[0] * size, b[1] - along[1] * size];
     let side = [-along[1] * 0.42 * size, along[0] * 0.42 * size];

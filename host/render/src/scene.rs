@@ -43,7 +43,7 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrow {
     /// From its foot to its tip, m on the picture.
-    pub way: [f32; 2],
+    pub vector: [f32; 2],
     /// Its colour.
     pub colour: Colour,
     /// Width of its shaft, units.
@@ -111,7 +111,7 @@ pub struct LegendEntry {
 pub enum Sign {
     /// A colour ramp, with labels for its ends.
     Ramp(&'static [Colour], [String; 2]),
-    /// An arrow, `way` m long at the picture's scale.
+    /// An arrow, `vector` m long at the picture's scale.
     Arrow(Arrow),
     /// A cell.
     Cell(Colour),

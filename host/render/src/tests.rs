@@ -25,8 +25,8 @@ fn look() -> Look {
     }
 }
 
-fn cell(at: [f32; 2], way: [f32; 2]) -> Cell {
-    let arrow = Arrow { way, colour: RED, width: 2.0 };
+fn cell(at: [f32; 2], vector: [f32; 2]) -> Cell {
+    let arrow = Arrow { vector, colour: RED, width: 2.0 };
     Cell { at, colour: BLUE, arrows: [Some(arrow), None] }
 }
 
@@ -63,7 +63,7 @@ fn digest(canvas: &Canvas) -> u64 {
 }
 
 #[test]
-fn an_arrow_lies_where_the_motion_is() {
+fn arrows_lie_where_the_motion_is() {
     let picture = draw(Panel { cells: vec![cell([10.0, 5.0], [0.0, -4.0])], ..Panel::default() });
     let red = places(&picture, RED);
     let ([x0, x1], [y0, y1]) = (bounds(&red, 0), bounds(&red, 1));
@@ -176,7 +176,7 @@ fn full() -> Canvas {
         size: [4.4, 1.9],
         colour: BLUE,
         label: "12".into(),
-        arrow: Some(Arrow { way: [3.0, 4.0], colour: RED, width: 1.7 }),
+        arrow: Some(Arrow { vector: [3.0, 4.0], colour: RED, width: 1.7 }),
     };
     let panel = Panel {
         title: "Flow over ground".into(),
@@ -196,7 +196,7 @@ fn full() -> Canvas {
     let entry = |sign, text: &str| LegendEntry { sign, text: text.into() };
     let legend = vec![
         entry(Sign::Ramp(colours::SPEEDS, ["0".into(), "≥ 15".into()]), "m/s"),
-        entry(Sign::Arrow(Arrow { way: [5.0, 0.0], colour: RED, width: 1.7 }), "10 m/s"),
+        entry(Sign::Arrow(Arrow { vector: [5.0, 0.0], colour: RED, width: 1.7 }), "10 m/s"),
         entry(Sign::Outline(BLUE), "car"),
         entry(Sign::Line(crate::WINDOW), "window"),
     ];
@@ -221,7 +221,7 @@ fn a_png_is_read_back() {
 }
 
 #[test]
-fn nonsense_is_left_out() {
+fn invalid_input_is_left_out() {
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 0.0];
     let pairs = || odd.iter().flat_map(|x| odd.map(|y| [*x, y]));
     let outline = |[a, b]: [f32; 2]| Outline {
@@ -230,7 +230,7 @@ fn nonsense_is_left_out() {
         size: [a, b],
         colour: RED,
         label: "odd".into(),
-        arrow: Some(Arrow { way: [a, b], colour: RED, width: a }),
+        arrow: Some(Arrow { vector: [a, b], colour: RED, width: a }),
     };
     let panel = Panel {
         points: pairs().map(|[a, b]| [a, b, a]).collect(),
@@ -258,7 +258,7 @@ fn what_cannot_be_drawn_is_an_error() {
 }
 
 #[test]
-fn a_film_has_every_picture_for_its_time() {
+fn each_picture_of_a_film_is_shown_for_its_duration() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.png");
     let out = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());

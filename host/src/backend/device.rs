@@ -7,7 +7,7 @@ use raywake_core::perceive::{
 use raywake_core::prepare::uniform_of;
 use raywake_core::record::SweepUniform;
 use raywake_core::stages::{Buffer, FLOW_PROGRAMS};
-use raywake_core::team::{Alone, Team};
+use raywake_core::team::{SingleThread, Team};
 use raywake_gpu::{Census, Executor, GpuError, Heap, Options};
 use raywake_kernels::schedule::Schedule;
 
@@ -37,7 +37,7 @@ impl Device {
         device.executor.run(LOAD)?;
         // Shifted out of view: nothing the device held before remains.
         let empty = SweepUniform { shift_x: profile.side as i32, ..uniform_of(profile, 0) };
-        device.perceive(&empty, &Alone, &mut (), || ())?;
+        device.perceive(&empty, &SingleThread, &mut (), || ())?;
         Ok(device)
     }
 
@@ -95,7 +95,7 @@ impl Perceive for Device {
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
         sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep))?);
-        self.executor.run_beside(FLOW, meanwhile)?;
+        self.executor.run_alongside(FLOW, meanwhile)?;
         timer.measured(&mut self.executor.times(FLOW), MEANWHILE);
         if let Err(what) = self.left().check(sweep) {
             return Err(self.executor.give_up(FLOW, what));

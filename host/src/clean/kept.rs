@@ -9,7 +9,7 @@ use raywake_io::sink::streams::{Content, StreamTargets};
 use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{Overview, SweepData};
 
-use super::judged::Judged;
+use super::verdict::ReturnVerdict;
 
 /// Names of the folders or files.
 const NAMES: [&str; 2] = ["static", "moving"];
@@ -37,7 +37,7 @@ impl KeptClouds {
             };
             let [still, moving] = NAMES.map(bag);
             let bags = still?.zip(moving?).map(|(still, moving)| Box::new([still, moving]));
-            let absent = || Error::lacking("an MCAP file", "mcap");
+            let absent = || Error::missing_feature("an MCAP file", "mcap");
             return bags.map(KeptClouds::Bags).ok_or_else(absent);
         };
         NAMES.iter().try_for_each(|name| atomic::create_folder(&root.join(name)))?;
@@ -45,13 +45,13 @@ impl KeptClouds {
     }
 
     /// Writes the returns of a sweep by verdict.
-    pub fn sweep(&mut self, sweep: &SweepData, judged: &[Judged]) -> Result<(), Error> {
+    pub fn sweep(&mut self, sweep: &SweepData, judged: &[ReturnVerdict]) -> Result<(), Error> {
         let of = |moves: bool| -> Vec<Point> {
             let all = sweep.points.iter().zip(judged);
             let kept = all.filter(|(_, judged)| match judged {
-                Judged::None => false,
-                Judged::Unknown | Judged::Static => !moves,
-                Judged::Moving => moves,
+                ReturnVerdict::None => false,
+                ReturnVerdict::Unknown | ReturnVerdict::Static => !moves,
+                ReturnVerdict::Moving => moves,
             });
             kept.map(|(point, _)| *point).collect()
         };

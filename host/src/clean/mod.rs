@@ -5,9 +5,9 @@
 //! and what only appears to move seldom does so both ways.
 
 mod backwards;
-mod judged;
 mod kept;
-mod still_map;
+mod static_map;
+mod verdict;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -24,16 +24,16 @@ use crate::config;
 use crate::console::{interrupted, note, say};
 use crate::error::RunError;
 use crate::progress::Progress;
-use crate::session::each_sweep;
-use crate::settings_file::Made;
+use crate::session::for_each_sweep;
+use crate::settings_file::ResultSettings;
 use crate::weight_files::WeightFiles;
 use backwards::Backwards;
-use judged::{OneWay, Verdicts};
 use kept::KeptClouds;
 use raywake_io::Error;
 use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{self, Source, SweepData};
-use still_map::StillMap;
+use static_map::StaticMap;
+use verdict::{PassResults, Verdicts};
 
 /// Minimum mean P(moves) of both passes for a return to count as moving. Static returns kept and
 /// moving ones removed, % (IoU of the latter): on cluttered streets 99.93, 97.6 (97.1) at 0.3,
@@ -49,7 +49,7 @@ fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let profile = config::profile(&args.flow.profile)?;
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let sweeps = args.part.range(source.len())?;
-    let made = Made {
+    let made = ResultSettings {
         command: "clean",
         recording: source.overview(),
         first: sweeps.start,
@@ -65,7 +65,7 @@ fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         profile,
         weights,
         seen: Vec::new(),
-        map: StillMap::new(args.voxel),
+        map: StaticMap::new(args.voxel),
         clock: ReturnClock::new(),
         counts: [0; 4],
     };
@@ -86,7 +86,7 @@ fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
 struct SeenSweep {
     world_from_vehicle: Pose,
     twist: Twist,
-    forwards: OneWay,
+    forwards: PassResults,
     verdicts: Verdicts,
 }
 
@@ -95,7 +95,7 @@ struct Cleaning<'a> {
     profile: Profile,
     weights: WeightFiles,
     seen: Vec<SeenSweep>,
-    map: StillMap,
+    map: StaticMap,
     clock: ReturnClock,
     /// Numbers of returns by verdict.
     counts: [u64; 4],
@@ -114,11 +114,11 @@ impl Cleaning<'_> {
         say(args.quiet, "forwards\n")?;
         let mut drive = chosen.drive;
         let seen = &mut self.seen;
-        let end = each_sweep(source, sweeps, args.quiet, |_, visit| {
+        let end = for_each_sweep(source, sweeps, args.quiet, |_, visit| {
             let before = visit.before.map_or(&[][..], |before| &before.points);
             let flows = drive.step(&visit.now.sweep(), before)?.output.flows;
             if let Some((last, flows)) = seen.last_mut().zip(flows) {
-                last.forwards = OneWay::of(flows.points.iter());
+                last.forwards = PassResults::of(flows.points.iter());
             }
             let &SweepData { world_from_vehicle, twist, .. } = visit.now;
             let (forwards, verdicts) = Default::default();
@@ -149,19 +149,19 @@ impl Cleaning<'_> {
             let before = if done > 0 { &later.points[..] } else { &[] };
             let flows = drive.step(&now.sweep(), before)?.output.flows;
             if done > 0 {
-                let found = flows.map(|flows| OneWay::of(flows.points.iter()));
+                let found = flows.map(|flows| PassResults::of(flows.points.iter()));
                 self.judge(number + 1, later.points.len(), &found.unwrap_or_default());
             }
             std::mem::swap(&mut now, &mut later);
             progress.update(done + 1);
         }
         progress.finish();
-        self.judge(0, later.points.len(), &OneWay::default());
+        self.judge(0, later.points.len(), &PassResults::default());
         Ok(true)
     }
 
     /// Decides the verdicts on the returns of a sweep.
-    fn judge(&mut self, number: usize, returns: usize, backwards: &OneWay) {
+    fn judge(&mut self, number: usize, returns: usize, backwards: &PassResults) {
         let moving = self.args.flow.profile.moving.unwrap_or(MOVING_MIN);
         let seen = &mut self.seen[number];
         let forwards = std::mem::take(&mut seen.forwards);
@@ -242,7 +242,7 @@ impl RecordingCommand for args::CleanArgs {
         Some(&self.out)
     }
 
-    fn set_out(&mut self, out: PathBuf) {
+    fn set_output(&mut self, out: PathBuf) {
         self.out = out;
     }
 
@@ -250,7 +250,7 @@ impl RecordingCommand for args::CleanArgs {
         None
     }
 
-    fn carry_out(&self) -> Result<bool, RunError> {
+    fn execute(&self) -> Result<bool, RunError> {
         clean(self)
     }
 }

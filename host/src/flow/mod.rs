@@ -21,7 +21,7 @@ use crate::console::{note, say};
 use crate::error::RunError;
 use crate::laps::Laps;
 use crate::picture::{self, Subject};
-use crate::statistics::{Dropped, in_words};
+use crate::statistics::{Dropped, describe_reset};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
@@ -131,7 +131,7 @@ fn points(
         let [a, b] = [&args.first, &args.second].map(|path| path.display());
         return Err(RunError::Io(Error::Usage(format!(
             "{b} does not follow {a}: {}",
-            in_words(reset).1
+            describe_reset(reset).1
         ))));
     }
     if let Some(flows) = &stepped.output.flows {

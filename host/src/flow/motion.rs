@@ -43,10 +43,10 @@ fn refusal(best: &Registration) -> String {
         r if r.overlap < OVERLAP_MIN => {
             format!("the clouds overlap by no more than {share:.0} %")
         }
-        r if r.unobserved.planar > 0 => format!(
+        r if r.unobservable.planar > 0 => format!(
             "the scene, like a single wall, a tunnel or bare ground, leaves {} of the 3 degrees of \
              freedom on the ground undetermined",
-            r.unobserved.planar
+            r.unobservable.planar
         ),
         r => format!("no convergence in {} iterations", r.iterations),
     };
@@ -65,10 +65,10 @@ fn report(r: &Registration) -> String {
         100.0 * r.rms_m,
         r.iterations,
     );
-    if r.unobserved.upright > 0 {
+    if r.unobservable.upright > 0 {
         text += &format!(
             "note: {} of height, roll and pitch not observable and assumed unchanged\n",
-            r.unobserved.upright
+            r.unobservable.upright
         );
     }
     text

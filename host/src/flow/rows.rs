@@ -71,7 +71,9 @@ impl Form {
         let unable = |what: &str| format!("--out {}: {what}", path.display());
         match path.extension().and_then(|e| e.to_str()) {
             Some("feather") if cfg!(feature = "arrow") => Ok(Form::Feather),
-            Some("feather") => Err(Error::lacking(format!("--out {}", path.display()), "arrow")),
+            Some("feather") => {
+                Err(Error::missing_feature(format!("--out {}", path.display()), "arrow"))
+            }
             Some("bin") => Ok(Form::Bin),
             _ => Err(Error::Usage(unable("the extension must be .feather or .bin"))),
         }
@@ -107,7 +109,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     #[test]
-    fn flow_has_the_sensors_motion_and_motion_has_not() {
+    fn flow_includes_the_sensors_motion_and_motion_does_not() {
         // The sensor moves a metre forward and turns left.
         let second_from_first = Pose::planar(1.0, 0.0, 0.0, FRAC_PI_2).inverse();
         let row = |position, velocity_world_mps| {

@@ -82,7 +82,7 @@ mod tests {
     const SOON: Duration = Duration::from_millis(1);
 
     #[test]
-    fn the_newest_is_fetched() {
+    fn the_newest_value_is_fetched() {
         let queue = Handover::new(0);
         let mut mine = 9;
         assert_eq!((queue.fetch(&mut mine, SOON), mine), (Fetched::Nothing, 9));
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_waits_is_woken() {
+    fn waiting_threads_are_woken() {
         let queue = Handover::new(0);
         std::thread::scope(|scope| {
             let waits = || queue.fetch(&mut 0, Duration::from_secs(60));

@@ -5,7 +5,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
 use raywake_io::source::capture::assembly::LiveSweep;
 use raywake_registration::Odometry;
-use raywake_registration::odometry::Locating;
+use raywake_registration::odometry::PoseStatus;
 use serde::Serialize;
 
 use super::poses::PoseReceiver;
@@ -84,10 +84,10 @@ impl<'a> LiveLocator<'a> {
                 let (stamp_s, points) = (data.stamp_s, &data.points);
                 let found = odometry
                     .step(|odometry| Ok::<_, RunError>(odometry.locate(stamp_s, points, rig)))?;
-                *match found.locating {
-                    Locating::Start | Locating::Registered => &mut counts.registered,
-                    Locating::Degenerate => &mut counts.degenerate,
-                    Locating::Lost => &mut counts.lost,
+                *match found.pose_status {
+                    PoseStatus::Start | PoseStatus::Registered => &mut counts.registered,
+                    PoseStatus::Degenerate => &mut counts.degenerate,
+                    PoseStatus::Lost => &mut counts.lost,
                 } += 1;
                 (found.world_from_vehicle, found.twist)
             }

@@ -138,7 +138,7 @@ impl Plan<'_> {
         }
         let LiveRig { rig, notes } = sensor.learn(&first.data, &args.place.options())?;
         note(args.quiet, &notes)?;
-        let turn = Duration::from_nanos(first.turn_ns as u64);
+        let turn = Duration::from_nanos(first.period_ns as u64);
         let deadline = args.deadline.unwrap_or(turn);
         let backend = &args.flow.backend;
         let timeout = backend.timeout.min(deadline * DEVICE_DEADLINES);
@@ -199,7 +199,7 @@ impl Plan<'_> {
         sweeps: &Handover<LiveSweep>,
         into: &mut LiveSweep,
     ) -> Result<bool, RunError> {
-        let (began, mut told) = (Instant::now(), false);
+        let (began, mut notified) = (Instant::now(), false);
         loop {
             match sweeps.fetch(into, POLL) {
                 Fetched::Value => return Ok(true),
@@ -209,8 +209,8 @@ impl Plan<'_> {
                     return Ok(false);
                 }
             }
-            if !told && began.elapsed() > PATIENCE {
-                told = true;
+            if !notified && began.elapsed() > PATIENCE {
+                notified = true;
                 let counts = receiver.state().counts;
                 let what = format!(
                     "no complete sweep yet: {} packets from a {}, {} other datagrams",

@@ -29,7 +29,7 @@ impl LiveObjects<'_> {
     /// # Errors
     /// [`RunError::NoMemory`].
     pub fn new(params: TrackingParams, profile: &Profile) -> Result<LiveObjects<'_>, RunError> {
-        memory::ask_for(LiveObjects::BYTES as u64)?;
+        memory::probe_memory(LiveObjects::BYTES as u64)?;
         let tracker = raywake_alloc_guard::boxed!(ObjectTracker, ObjectTracker::new());
         Ok(LiveObjects {
             params,

@@ -22,7 +22,7 @@ pub struct Outlets<'a> {
 
 /// Facts about a pair's flow that was passed on.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct FlowGone {
+pub struct SentFlow {
     /// Columns that move.
     pub moving: usize,
     /// Time spent on output that nobody waits for.
@@ -31,7 +31,7 @@ pub struct FlowGone {
 
 impl Outlets<'_> {
     /// Passes on the flow of a pair with its first sweep.
-    pub fn flow(&mut self, first: &LiveSweep, flows: &PairFlows) -> FlowGone {
+    pub fn flow(&mut self, first: &LiveSweep, flows: &PairFlows) -> SentFlow {
         let moves = |column: &&ColumnFlow| column.velocity_world_mps != [0.0; 2];
         let columns = flows.columns.iter().filter(moves);
         let moving = columns.clone().count();
@@ -47,7 +47,7 @@ impl Outlets<'_> {
             flows.columns.iter().for_each(|c| digest.column(c));
             flows.points.iter().for_each(|p| digest.point(&p));
         }
-        FlowGone { moving, aside: clock.elapsed() }
+        SentFlow { moving, aside: clock.elapsed() }
     }
 
     /// Passes on the objects in a pair's first sweep.

@@ -14,7 +14,7 @@ use raywake_io::Error;
 use raywake_io::source::rigid;
 use serde::Serialize;
 
-use super::receiver::{bind, each_datagram};
+use super::receiver::{bind, for_each_datagram};
 
 /// First bytes of a datagram, and its length.
 const MAGIC: &[u8] = b"RWP1\0\0\0\0";
@@ -73,7 +73,7 @@ impl PoseReceiver {
     /// Receives poses until `stop`.
     pub fn run(&self, stop: &AtomicBool) {
         raywake_alloc_guard::watch("poses", || {
-            each_datagram(&self.socket, stop, |datagram, _| self.track().take(datagram));
+            for_each_datagram(&self.socket, stop, |datagram, _| self.track().take(datagram));
         });
     }
 
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_pose_is_counted() {
+    fn invalid_poses_are_counted() {
         let mut track = track();
         assert!(track.at(0, 1).is_none());
         track.take(b"RWP1");

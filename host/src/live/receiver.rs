@@ -18,7 +18,7 @@ use super::handover::Handover;
 const DATAGRAM: usize = 1 << 16;
 /// Size of the receive buffer requested from the system, bytes: two sweeps of the largest sensor
 /// (OS1-128, 2048 columns).
-const HELD: usize = 8 << 20;
+const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
 /// How often to check whether to stop.
 const POLL: Duration = Duration::from_millis(50);
 
@@ -66,7 +66,7 @@ fn pause(e: &std::io::Error) {
 }
 
 /// Passes every datagram to `take` until `stop`.
-pub fn each_datagram(
+pub fn for_each_datagram(
     socket: &UdpSocket,
     stop: &AtomicBool,
     mut take: impl FnMut(&[u8], SocketAddr),
@@ -85,7 +85,7 @@ impl Receiver {
     pub fn bind(address: SocketAddr, sensor: LiveSensor) -> Result<Receiver, Error> {
         let socket = bind(address, "listen")?;
         // The system grants as much as it allows.
-        let _ = SockRef::from(&socket).set_recv_buffer_size(HELD);
+        let _ = SockRef::from(&socket).set_recv_buffer_size(RECEIVE_BUFFER_BYTES);
         let address = socket.local_addr().unwrap_or(address);
         Ok(Receiver { socket, address, sensor, state: Mutex::default() })
     }
@@ -113,10 +113,10 @@ impl Receiver {
     /// A note for the user if the receive buffer is small.
     pub fn note(&self) -> Option<String> {
         let held = self.held();
-        (held < HELD).then(|| {
+        (held < RECEIVE_BUFFER_BYTES).then(|| {
             format!(
-                "the receive buffer holds {held} bytes, {HELD} were requested: sysctl \
-                 net.core.rmem_max={HELD} allows them"
+                "the receive buffer holds {held} bytes, {RECEIVE_BUFFER_BYTES} were requested: \
+                 sysctl net.core.rmem_max={RECEIVE_BUFFER_BYTES} allows them"
             )
         })
     }
@@ -126,7 +126,7 @@ impl Receiver {
     pub fn run(&self, sweeps: &Handover<LiveSweep>, stop: &AtomicBool) {
         let (mut assembler, mut sender) = (Assembler::new(self.sensor.clone()), None);
         raywake_alloc_guard::watch("receiver", || {
-            each_datagram(&self.socket, stop, |datagram, from| {
+            for_each_datagram(&self.socket, stop, |datagram, from| {
                 let (arrived, now_ns) = (Instant::now(), now_ns());
                 let known = *sender.get_or_insert(from.ip()) == from.ip();
                 match known {
@@ -168,7 +168,7 @@ mod tests {
     use raywake_io::source::capture::live::SensorModel;
 
     #[test]
-    fn what_linux_tells_of_a_socket() {
+    fn socket_statistics_of_linux() {
         let table = "   sl  local_address rem_address   st tx rx tr tm retr uid timeout inode ref \
                      pointer drops\n\
                      1: 0100007F:0940 00000000:0000 07 0:0 00:0 00 0 0 42 2 0000 17\n\
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_is_had_once() {
+    fn an_address_can_be_bound_only_once() {
         let sensor = LiveSensor::of(SensorModel::Vlp16, None).unwrap();
         let first = Receiver::bind("127.0.0.1:0".parse().unwrap(), sensor.clone()).unwrap();
         let error = Receiver::bind(first.address(), sensor).err().unwrap();

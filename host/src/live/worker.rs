@@ -14,7 +14,7 @@ use sd_notify::NotifyState;
 use super::handover::{Fetched, Handover};
 use super::locating::{LiveLocator, LocatedCounts};
 use super::objects::LiveObjects;
-use super::outlets::{FlowGone, Outlets, sent_sweep};
+use super::outlets::{Outlets, SentFlow, sent_sweep};
 use super::receiver::Receiver;
 use super::stream::SweepFacts;
 use super::summary::{LiveStatistics, LiveSummary};
@@ -169,11 +169,11 @@ impl LiveRun<'_> {
     /// Processes one sweep, from its returns to the datagrams.
     fn sweep(&mut self) -> Result<(), RunError> {
         let LiveRun { worker, statistics, now, last, paired, frames, .. } = self;
-        let turn_ns = worker.turn.as_nanos() as u64;
+        let period_ns = worker.turn.as_nanos() as u64;
         let counts = &mut statistics.counts;
         counts.incomplete += u64::from(now.lost_packets > 0);
         counts.missing += now.data.dropped.sweeps_before;
-        if !worker.locator.locate(worker.rig, now, turn_ns)? {
+        if !worker.locator.locate(worker.rig, now, period_ns)? {
             return Ok(());
         }
         let before = if *paired { &last.data.points[..] } else { &[] };
@@ -182,7 +182,7 @@ impl LiveRun<'_> {
         statistics.sweep(output);
         let flows = output.flows.as_ref();
         let gone = flows.map(|flows| worker.outlets.flow(last, flows)).unwrap_or_default();
-        let FlowGone { moving, aside } = gone;
+        let SentFlow { moving, aside } = gone;
         statistics.counts.moving_columns += moving as u64;
         let mut objects = 0;
         if let Some(tracker) = worker.objects.as_mut().filter(|_| *paired) {

@@ -14,8 +14,8 @@ use crate::laps::milliseconds;
 use crate::memory;
 use crate::order_statistics::Spread;
 use crate::picture::{PictureFiles, Pictures, Subject, SweepFigures};
-use crate::session::each_sweep;
-use crate::settings_file::Made;
+use crate::session::for_each_sweep;
+use crate::settings_file::ResultSettings;
 use crate::statistics::Dropped;
 use raywake_io::sink::feather::{self, Voxel};
 use raywake_io::source::{self, SweepData};
@@ -30,11 +30,11 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let backend = match &wanted.device {
         Some(options) => MapBackend::Device(Box::new(DeviceMap::new(&profile, options)?)),
         None => {
-            memory::ask_for(Mapper::bytes(&profile) as u64)?;
+            memory::probe_memory(Mapper::bytes(&profile) as u64)?;
             MapBackend::Scalar(Box::new(ScalarMap::new(&profile)))
         }
     };
-    let made = Made {
+    let made = ResultSettings {
         command: "map",
         recording: source.overview(),
         first: sweeps.start,
@@ -52,7 +52,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let files = PictureFiles::of(&args.views, args.png.then(|| args.out.clone()));
     let mut pictures = Pictures::create(&files, source.name(), sweeps.len())?;
     let mut tally = MapTally::default();
-    let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
+    let end = for_each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         let (voxels, origin_m) = tally.sweep(&mut mapper, &profile, visit.now)?;
         let path = args.out.join(format!("{:010}.feather", visit.now.frame));
         let subject = Subject::Map { voxels: &voxels, origin_m, voxel_m: profile.voxel_m };

@@ -13,7 +13,7 @@ use raywake_core::record::Update;
 use raywake_core::record::{NONE, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
 use raywake_core::sweep::{Rig, Sweep};
-use raywake_core::team::Alone;
+use raywake_core::team::SingleThread;
 use raywake_gpu::GpuError;
 
 /// Either backend.
@@ -110,7 +110,7 @@ impl Mapper {
         self.lattice_origin.get_or_insert(window.lattice_origin);
         let (rays, origins) = self.backend.input()?;
         let (count, dropped) = self.preparation.prepare(
-            &Alone,
+            &SingleThread,
             &Placement { profile: &self.profile, rig: &self.rig, window: &window, sweep },
             RayBuffers { rays, origins, columns: &mut self.columns, placed: &mut [] },
         );

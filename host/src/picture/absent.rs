@@ -19,7 +19,7 @@ impl NoPictures {
     }
 
     /// Returns `false`.
-    pub fn are_wanted(&self) -> bool {
+    pub fn are_enabled(&self) -> bool {
         false
     }
 
@@ -40,5 +40,5 @@ pub fn write_one(_: &Path, _: &SweepData, _: &Subject, _: &str) -> Result<(), Er
 }
 
 fn lacking() -> Error {
-    Error::lacking("a picture", "png")
+    Error::missing_feature("a picture", "png")
 }

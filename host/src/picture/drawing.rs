@@ -61,7 +61,7 @@ pub(super) fn speeds(of: &str) -> [LegendEntry; 2] {
 /// The arrow of a velocity, m/s along the picture's axes.
 pub(super) fn arrow(velocity: [f32; 2], width: f32) -> Arrow {
     let colour = colours::ramp(colours::SPEEDS, speed(velocity) / FAST_MPS);
-    Arrow { way: velocity.map(|v| v * ARROW_S), colour, width }
+    Arrow { vector: velocity.map(|v| v * ARROW_S), colour, width }
 }
 
 /// The magnitude of a velocity, m/s. Not computed by `hypot`, which differs between platforms.

@@ -52,7 +52,7 @@ pub enum Subject<'a> {
         /// The objects.
         objects: &'a [TrackedObject],
         /// The path of each so far, in the world, m.
-        ways: &'a [Vec<[f64; 3]>],
+        paths: &'a [Vec<[f64; 3]>],
     },
 }
 

@@ -43,7 +43,7 @@ impl Pictures {
     }
 
     /// Whether any are drawn.
-    pub fn are_wanted(&self) -> bool {
+    pub fn are_enabled(&self) -> bool {
         self.folder.is_some() || self.film.is_some() || self.page.is_some()
     }
 
@@ -57,7 +57,7 @@ impl Pictures {
         subject: &Subject,
         figures: &SweepFigures,
     ) -> Result<(), Error> {
-        if !self.are_wanted() {
+        if !self.are_enabled() {
             return Ok(());
         }
         let [start_s, last_s] = self.stamps_s.unwrap_or([sweep.stamp_s; 2]);
@@ -116,7 +116,7 @@ fn view(sweep: &SweepData, subject: &Subject) -> (Panel, Look) {
         Subject::Map { voxels, origin_m, voxel_m } => {
             map::view(&sweep.world_from_vehicle, voxels, *origin_m, *voxel_m)
         }
-        Subject::Objects { objects, ways } => tracks::view(sweep, objects, ways),
+        Subject::Objects { objects, paths } => tracks::view(sweep, objects, paths),
     }
 }
 

@@ -72,7 +72,7 @@ fn arrows_point_where_columns_go() {
 }
 
 #[test]
-fn motion_shows_from_the_first_observation_on_and_the_young_is_thinner() {
+fn motion_is_drawn_from_the_first_observation_on_thinner_while_young() {
     let pixels = |column| motion(&draw(&[column], 0.0, PictureFrame::World)).1;
     let young = pixels(ColumnFlow { age: 0, ..COLUMN });
     assert!(young > 50, "{young}");
@@ -81,7 +81,7 @@ fn motion_shows_from_the_first_observation_on_and_the_young_is_thinner() {
 }
 
 #[test]
-fn what_is_static_or_unknown_has_no_arrow() {
+fn static_and_unknown_cells_have_no_arrow() {
     let static_ = ColumnFlow { velocity_world_mps: [0.3, 0.0], ..COLUMN };
     let unmatched = ColumnFlow { basis: FlowBasis::Unmatched, ..COLUMN };
     let nonsense = ColumnFlow { velocity_world_mps: [f32::NAN; 2], ..COLUMN };
@@ -90,7 +90,7 @@ fn what_is_static_or_unknown_has_no_arrow() {
 }
 
 #[test]
-fn a_map_shows_what_stands_and_what_is_free() {
+fn map_shows_static_structure_and_free_space() {
     // A wall 3 m high 20 m ahead, a free lane up to it, ground to its right; voxels of 0.4 m.
     let voxel = |i, j, k, log_odds_tenths| Voxel { index: [i, j, k], log_odds_tenths };
     let ground = (0..100).map(|i| voxel(i, -60, 0, 20));
@@ -123,7 +123,7 @@ fn between<'a>(page: &'a str, from: &str, to: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_page_holds_every_sweep_and_pictures_of_some() {
+fn page_lists_every_sweep_and_shows_some() {
     let folder = tempfile::tempdir().unwrap();
     let [page, film, none] = ["p.html", "f.png", "n.html"].map(|name| folder.path().join(name));
     let files = |page, film| PictureFiles { folder: None, page: Some(page), film };

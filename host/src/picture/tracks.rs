@@ -18,14 +18,14 @@ const SIDE_MIN_M: f32 = 0.4;
 pub(super) fn view(
     sweep: &SweepData,
     objects: &[TrackedObject],
-    ways: &[Vec<[f64; 3]>],
+    paths: &[Vec<[f64; 3]>],
 ) -> (Panel, Look) {
     let pose = &sweep.world_from_vehicle;
     let mut panel = Panel { title: "Objects".into(), points: places(sweep), ..Panel::default() };
-    for (object, way) in objects.iter().zip(ways) {
+    for (object, path) in objects.iter().zip(paths) {
         let outline = outline(object, pose);
         if outline.arrow.is_some() {
-            let places = way.iter().map(|at| seen_from(pose, *at)).collect();
+            let places = path.iter().map(|at| seen_from(pose, *at)).collect();
             panel.trails.push(Trail { places, colour: outline.colour, width: WIDE });
         }
         panel.outlines.push(outline);
@@ -33,9 +33,9 @@ pub(super) fn view(
     // Moving objects are drawn on top of static ones.
     panel.outlines.sort_by_key(|o| o.arrow.is_some());
     let still = entry(Sign::Outline(colours::BORDER), "static");
-    let way = Sign::Line(raywake_render::Pen::new(colours::SPEEDS[2], WIDE));
+    let trail = Sign::Line(raywake_render::Pen::new(colours::SPEEDS[2], WIDE));
     let legend = speeds("over ground").into_iter();
-    let legend = legend.chain([entry(way, "path so far"), still, return_heights()]).collect();
+    let legend = legend.chain([entry(trail, "path so far"), still, return_heights()]).collect();
     (panel, look(REACH_M, CELL_M, legend))
 }
 

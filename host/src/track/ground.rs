@@ -121,7 +121,7 @@ NODATA_value -9999
     }
 
     #[test]
-    fn what_is_no_grid() {
+    fn invalid_grids() {
         let wrong = [
             ("cellsize 2", "", "`cellsize`"),
             ("cellsize 2", "cellsize -2", "above 0"),

@@ -17,8 +17,8 @@ use crate::drive::Drive;
 use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::progress::Progress;
-use crate::session::each_sweep;
-use crate::settings_file::Made;
+use crate::session::for_each_sweep;
+use crate::settings_file::ResultSettings;
 use crate::weight_files::WeightFiles;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
@@ -43,7 +43,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         args::FrontEndKind::Variance => None,
         args::FrontEndKind::Flow => Some(flow(args, &settings.profile, source.rig())?),
     };
-    let made = Made {
+    let made = ResultSettings {
         command: "track",
         recording: source.overview(),
         first: sweeps.start,
@@ -58,7 +58,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag)?;
     tracker.all |= args.all;
     let mut report = report::Report::default();
-    let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
+    let end = for_each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         report.read(visit.now);
         let clock = Instant::now();
         if let Some(counts) = tracker.sweep(visit.now, visit.before)? {
@@ -129,7 +129,7 @@ impl RecordingCommand for args::TrackArgs {
         self.out.as_deref()
     }
 
-    fn set_out(&mut self, out: PathBuf) {
+    fn set_output(&mut self, out: PathBuf) {
         self.out = Some(out);
     }
 
@@ -138,7 +138,7 @@ impl RecordingCommand for args::TrackArgs {
         streams.or(self.summary.is_some().then_some("summary"))
     }
 
-    fn carry_out(&self) -> Result<bool, RunError> {
+    fn execute(&self) -> Result<bool, RunError> {
         track(self)
     }
 }

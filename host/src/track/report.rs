@@ -125,7 +125,7 @@ impl Report {
             returns: track.returns_seen(),
             class: track.class().map(ColumnClass::name),
             size_m: shape.size,
-            p_moves: mean_told(track.p_moves()),
+            p_moves: mean_known(track.p_moves()),
             moved_m: moved_m(track, estimator),
             speed_mps: estimator.state(for_s).speed,
             residual_m: report.costs.last().map_or(0.0, |c| c.residual_m),
@@ -163,10 +163,10 @@ impl Report {
 }
 
 /// Mean of the known values.
-fn mean_told(p_moves: &[f32]) -> Option<f32> {
-    let told = || p_moves.iter().filter(|p| !p.is_nan());
-    let count = told().count();
-    (count > 0).then(|| told().sum::<f32>() / count as f32)
+fn mean_known(p_moves: &[f32]) -> Option<f32> {
+    let known = || p_moves.iter().filter(|p| !p.is_nan());
+    let count = known().count();
+    (count > 0).then(|| known().sum::<f32>() / count as f32)
 }
 
 /// The facts and results of a tracking run.

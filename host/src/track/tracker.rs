@@ -8,7 +8,7 @@ use raywake_core::sweep::Rig;
 use raywake_core::team::Team as _;
 use raywake_objects::estimate::{EstimateParams, EstimateReport, Estimator, FixedLag};
 use raywake_objects::front_end::{
-    Flows, FrontEnd, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, TrackingCounts,
+    Flows, FrontEnd, HISTORY_MAX, TRACKS_MAX, Thinned, Track, TrackStatus, TrackingCounts,
 };
 use raywake_objects::object_box::ObjectBox;
 
@@ -106,7 +106,9 @@ impl Lag {
 
     /// Adds the observation of a track in the last step.
     fn update(&mut self, params: &EstimateParams, track: &Track, estimator: &mut Estimator) {
-        let Some(state) = track.state().filter(|_| track.life == Life::Live) else { return };
+        let Some(state) = track.state().filter(|_| track.status == TrackStatus::Live) else {
+            return;
+        };
         if track.observations == 1 {
             self.filter.clear();
             self.states.clear();
@@ -131,8 +133,8 @@ impl Tracker {
         ground: Option<Ground>,
         fixed_lag: bool,
     ) -> Result<Tracker, RunError> {
-        memory::ask_for(Tracker::bytes(fixed_lag))?;
-        let all = drive.as_ref().is_none_or(|d| !d.tells_classes());
+        memory::probe_memory(Tracker::bytes(fixed_lag))?;
+        let all = drive.as_ref().is_none_or(|d| !d.has_classes());
         let parts = TrackerParts {
             front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
@@ -221,7 +223,7 @@ impl Tracker {
 
     /// The tracks that ended in the last step, in slot order.
     pub fn ended_tracks(&self) -> impl Iterator<Item = &Track> {
-        self.parts.tracks.iter().filter(|t| t.life == Life::Ended)
+        self.parts.tracks.iter().filter(|t| t.status == TrackStatus::Ended)
     }
 
     /// The returns of the last step's sweep that belong to a track: index and track number.
@@ -247,7 +249,7 @@ impl Tracker {
 
     fn is_shown_at_its_end(&self, track: &Track) -> bool {
         let sure = track.observations >= self.params.front_end.observations_min;
-        track.life == Life::Ended && sure && self.shows(track)
+        track.status == TrackStatus::Ended && sure && self.shows(track)
     }
 
     /// Shows the tracks that ended in the last step, in slot order, each with the estimate of its

@@ -59,7 +59,7 @@ impl Files {
         let folder = args.out.clone();
         if let Some(root) = &folder {
             if !cfg!(feature = "arrow") {
-                return Err(Error::lacking("--out", "arrow"));
+                return Err(Error::missing_feature("--out", "arrow"));
             }
             ["clouds", "returns"].iter().try_for_each(|n| atomic::create_folder(&root.join(n)))?;
         }
@@ -73,19 +73,19 @@ impl Files {
 
     /// Writes the sweep of the last step, which took `ms` milliseconds.
     pub fn sweep(&mut self, sweep: &SweepData, tracker: &Tracker, ms: f64) -> Result<(), Error> {
-        if self.folder.is_none() && self.bag.is_none() && !self.pictures.are_wanted() {
+        if self.folder.is_none() && self.bag.is_none() && !self.pictures.are_enabled() {
             return Ok(());
         }
         self.of_returns.clear();
         self.of_returns.resize(sweep.points.len(), -1);
         tracker.members().for_each(|(n, track)| self.of_returns[n] = track as i32);
-        let (objects, ways): (Vec<TrackedObject>, Vec<Vec<[f64; 3]>>) =
-            tracker.objects().map(|(object, track)| (object, way(track))).unzip();
+        let (objects, paths): (Vec<TrackedObject>, Vec<Vec<[f64; 3]>>) =
+            tracker.objects().map(|(object, track)| (object, track_path(track))).unzip();
         let moving = objects.iter().filter(|o| o.velocity.is_some()).count();
         let figures = [("moving objects", moving as f64), ("ms per sweep", ms)];
         self.pictures.write(
             sweep,
-            &Subject::Objects { objects: &objects, ways: &ways },
+            &Subject::Objects { objects: &objects, paths: &paths },
             &figures,
         )?;
         if let Some(bag) = &mut self.bag {
@@ -156,7 +156,7 @@ impl Files {
 }
 
 /// The path of a track in the world, m.
-fn way(track: &Track) -> Vec<[f64; 3]> {
+fn track_path(track: &Track) -> Vec<[f64; 3]> {
     track.history().iter().map(|state| track.in_world(state.position)).collect()
 }
 

@@ -36,7 +36,7 @@ impl Team for ThreadTeam {
         if threads() > 1 {
             rayon_core::join(a, b);
         } else {
-            raywake_core::team::Alone.join(a, b);
+            raywake_core::team::SingleThread.join(a, b);
         }
     }
 

@@ -35,21 +35,22 @@ impl Bend {
         [(radius - offset) * s, radius - (radius - offset) * c, yaw]
     }
 
-    /// State of someone at this station and offset who moves along the line (`way` 1) or back (-1).
-    pub(crate) fn state(&self, [station, offset]: [f64; 2], way: f64, speed: f64) -> State {
+    /// State of someone at this station and offset who moves along the line (`sign` 1) or back
+    /// (-1).
+    pub(crate) fn state(&self, [station, offset]: [f64; 2], sign: f64, speed: f64) -> State {
         let [x, y, yaw] = self.at(station, offset);
-        let turned = if way < 0.0 { std::f64::consts::PI } else { 0.0 };
+        let turned = if sign < 0.0 { std::f64::consts::PI } else { 0.0 };
         State { x, y, yaw: yaw + turned, speed }
     }
 
     /// Curvature of the path of someone at this offset.
-    pub(crate) fn turn(&self, offset: f64, way: f64) -> f64 {
-        way * self.curvature / (1.0 - self.curvature * offset)
+    pub(crate) fn turn(&self, offset: f64, sign: f64) -> f64 {
+        sign * self.curvature / (1.0 - self.curvature * offset)
     }
 
     /// Path along the line at a constant offset for this long, s; at station `place[0]` at time 0.
-    pub(crate) fn follow(&self, place: [f64; 2], way: f64, speed: f64, long_s: f64) -> Path {
-        Path::from(self.state(place, way, speed)).then(long_s, 0.0, self.turn(place[1], way))
+    pub(crate) fn follow(&self, place: [f64; 2], sign: f64, speed: f64, long_s: f64) -> Path {
+        Path::from(self.state(place, sign, speed)).then(long_s, 0.0, self.turn(place[1], sign))
     }
 }
 
@@ -70,13 +71,13 @@ mod tests {
     }
 
     #[test]
-    fn who_follows_keeps_the_offset() {
-        for (curvature, way) in [(0.01, 1.0), (0.01, -1.0), (-0.02, 1.0), (0.0, -1.0)] {
+    fn followers_keep_their_offset() {
+        for (curvature, sign) in [(0.01, 1.0), (0.01, -1.0), (-0.02, 1.0), (0.0, -1.0)] {
             let bend = Bend { curvature };
-            let path = bend.follow([10.0, -3.0], way, 9.0, 20.0);
+            let path = bend.follow([10.0, -3.0], sign, 9.0, 20.0);
             for t in [-2.0, 1.0, 5.0] {
                 let at = path.at(t);
-                let gone = way * 9.0 * t / (1.0 + 3.0 * curvature);
+                let gone = sign * 9.0 * t / (1.0 + 3.0 * curvature);
                 let [x, y, _] = bend.at(10.0 + gone, -3.0);
                 assert!((at.x - x).hypot(at.y - y) < 1e-9, "{at:?}");
             }

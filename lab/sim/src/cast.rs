@@ -7,7 +7,7 @@ use crate::rig::{Firing, SensorRig, stamp_s};
 use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::still::Still;
+use crate::static_scene::StaticScene;
 use crate::target::{Fan, Hit, Ray, Target};
 use crate::truth::{Motions, Truth};
 use glam::DVec3;
@@ -20,7 +20,7 @@ pub(crate) type Returns = (Vec<Point>, Vec<Truth>);
 /// A scene and a rig, prepared for casting.
 pub(crate) struct Caster<'a> {
     scene: &'a Scene,
-    still: &'a Still,
+    static_scene: &'a StaticScene,
     rig: &'a SensorRig,
     clutter: Clutter,
     /// Moving objects: index and radius.
@@ -41,14 +41,14 @@ fn directions(sensor: &Sensor) -> Vec<DVec3> {
 impl<'a> Caster<'a> {
     pub(crate) fn new(
         scene: &'a Scene,
-        still: &'a Still,
+        static_scene: &'a StaticScene,
         rig: &'a SensorRig,
         clutter: Clutter,
     ) -> Caster<'a> {
         let objects = scene.objects.iter().enumerate();
-        let movers = objects.filter(|(_, o)| !o.is_still()).map(|(i, o)| (i, o.reach())).collect();
+        let movers = objects.filter(|(_, o)| !o.is_static()).map(|(i, o)| (i, o.reach())).collect();
         let beams = rig.mounts.iter().map(|m| (directions(&m.sensor), m.sensor.spread())).collect();
-        Caster { scene, still, rig, clutter, movers, beams }
+        Caster { scene, static_scene, rig, clutter, movers, beams }
     }
 
     /// Casts sweep `index` on `threads` threads, whose number does not affect the result; `ego` is
@@ -113,8 +113,8 @@ impl<'a> Caster<'a> {
             let Some(hit) = hit else {
                 continue;
             };
-            let clearness = air.clearness(hit.range);
-            let Some((range, intensity)) = measured(sensor, &hit, clearness, &mut rng) else {
+            let transmittance = air.transmittance(hit.range);
+            let Some((range, intensity)) = measured(sensor, &hit, transmittance, &mut rng) else {
                 continue;
             };
             returns.0.push(mount.point(firing, nominal * range, intensity));
@@ -172,7 +172,7 @@ impl<'a> Caster<'a> {
         for target in moving {
             best.consider(ray, target);
         }
-        self.still.nearest(ray, &mut best);
+        self.static_scene.nearest(ray, &mut best);
         (best.cosine > 0.0 && best.range < farthest).then_some(best)
     }
 }
@@ -193,13 +193,13 @@ fn diffuse(sensor: &Sensor, range: f64, rng: &mut Rng) -> (f64, f64) {
     (range + sensor.range_noise * rng.bell(), 0.08 * rng.unit())
 }
 
-/// Measured range and intensity, if there is a return; `clearness` is the share of the light that
-/// the air lets through.
-fn measured(sensor: &Sensor, hit: &Hit, clearness: f64, rng: &mut Rng) -> Option<(f64, f64)> {
+/// Measured range and intensity, if there is a return; `transmittance` is the share of the light
+/// that the air lets through.
+fn measured(sensor: &Sensor, hit: &Hit, transmittance: f64, rng: &mut Rng) -> Option<(f64, f64)> {
     let asphalt = Surface::matt(0.2);
     let surface = hit.target.map_or(asphalt, |t| t.surface);
     let signal = sensor.signal * surface.reflectivity * hit.cosine / (hit.range * hit.range);
-    let signal = clearness * signal;
+    let signal = transmittance * signal;
     let kept = (1.0 - surface.loss) * (1.0 - sensor.dropout) * (1.0 - (-signal).exp());
     let (lost, noise) = (!rng.chance(kept), rng.bell());
     let range = hit.range + sensor.range_noise * noise;
@@ -220,14 +220,14 @@ mod tests {
         for (name, seed) in SensorRig::NAMES.into_iter().zip(0..) {
             let rig: SensorRig = name.parse().unwrap();
             let (scene, mut rng) = (Scene::street(seed), Rng::new(seed));
-            let still = Still::new(&scene);
-            let caster = Caster::new(&scene, &still, &rig, Clutter::None);
+            let static_scene = StaticScene::new(&scene);
+            let caster = Caster::new(&scene, &static_scene, &rig, Clutter::None);
             for firing in rig.firings(30).iter().step_by(31) {
                 let t = stamp_s(30) + firing.offset_s;
                 let mount = &rig.mounts[firing.mount];
                 let ego = Pose::planar(0.0, -1.75, 0.4, 0.1) * mount.vehicle_from_sensor;
                 let near = caster.moving_targets(&caster.fan(firing, ego), t);
-                let objects = scene.objects.iter().enumerate().filter(|(_, o)| !o.is_still());
+                let objects = scene.objects.iter().enumerate().filter(|(_, o)| !o.is_static());
                 let parts = objects.flat_map(|(i, o)| (0..o.parts.len()).map(move |p| (i, o, p)));
                 let place = |(i, o, p): (usize, &crate::Object, usize)| {
                     Target::of_part(i, o, p, o.part_pose(p, &scene.ground, t), true)

@@ -174,7 +174,7 @@ impl Air {
     }
 
     /// Share of the light that comes back from this range.
-    pub(crate) fn clearness(&self, range: f64) -> f64 {
+    pub(crate) fn transmittance(&self, range: f64) -> f64 {
         self.drops.map_or(1.0, |drops| (-drops.loss * range).exp())
     }
 }
@@ -205,7 +205,7 @@ fn is_near(object: &Object, fan: &Fan, t: f64) -> bool {
 fn raises_dust(object: &Object) -> bool {
     (Class::Car..=Class::Bus).contains(&object.class)
         && object.id % 2 == 1
-        && !object.path.is_still()
+        && !object.path.is_static()
 }
 
 #[cfg(test)]
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn drops_send_back_the_share_they_say() {
+    fn drops_reflect_the_stated_share() {
         let nowhere = Scene::empty();
         let fan = Fan {
             origin: DVec3::ZERO,
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn dust_hangs_behind_what_moves_and_stays() {
+    fn dust_trails_behind_movers_and_lingers() {
         let mut scene = Scene::empty();
         let start = crate::path::State { x: 30.0, speed: 12.0, ..Default::default() };
         scene.add_car(crate::path::Path::from(start), 1);

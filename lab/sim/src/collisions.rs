@@ -48,7 +48,7 @@ pub(crate) fn check_clear(
         };
         let boxes: Vec<_> = all.iter().map(place).collect();
         for (n, (pose, size, reach)) in boxes.iter().enumerate() {
-            if step > 0 && all[n].0.is_still() {
+            if step > 0 && all[n].0.is_static() {
                 continue;
             }
             let apart = |other: DVec3| (other - pose.translation).length() - reach;

@@ -8,7 +8,7 @@ use crate::rig::{PERIOD_S, SensorRig, stamp_s};
 use crate::rng::Rng;
 use crate::scene::{ObjectState, Scene};
 use crate::scenery::Scenery;
-use crate::still::Still;
+use crate::static_scene::StaticScene;
 use crate::truth::Truth;
 use glam::DQuat;
 use raywake_core::pose::{Pose, Twist};
@@ -68,7 +68,7 @@ pub struct SimSweep {
 #[derive(Clone, Debug)]
 pub struct Drive {
     scene: Scene,
-    still: Still,
+    static_scene: StaticScene,
     path: Path,
     options: Options,
     seed: u64,
@@ -87,7 +87,7 @@ impl Drive {
     /// Drives along a path (street frame) through a given scene; the seed draws the noise, and the
     /// options' ego and density are ignored.
     pub fn through(scene: Scene, path: Path, seed: u64, options: Options) -> Drive {
-        Drive { still: Still::new(&scene), scene, path, options, seed, next: 0 }
+        Drive { static_scene: StaticScene::new(&scene), scene, path, options, seed, next: 0 }
     }
 
     /// Scene that is driven through.
@@ -117,7 +117,7 @@ impl Drive {
 
     fn street_from_vehicle(&self, t: f64) -> Pose {
         let state = self.path.at(t);
-        let foot = self.scene.ground.stand(state.x, state.y, state.yaw, [2.7, 1.5]);
+        let foot = self.scene.ground.standing_pose(state.x, state.y, state.yaw, [2.7, 1.5]);
         // The body pitches and rolls a little on its springs once it moves.
         let swing = 0.003 * (state.speed.abs() / 8.0).min(1.0);
         let nod = DQuat::from_rotation_y(swing * (7.3 * t + 0.4).sin());
@@ -148,7 +148,7 @@ impl Drive {
     pub fn sweep(&self, index: usize) -> SimSweep {
         let stamp_s = stamp_s(index);
         let Options { rig, clutter, .. } = &self.options;
-        let caster = Caster::new(&self.scene, &self.still, rig, *clutter);
+        let caster = Caster::new(&self.scene, &self.static_scene, rig, *clutter);
         let seed = Rng::split(self.seed, 16 + index as u64).bits();
         let ego = |t: f64| self.street_from_vehicle(t);
         let (points, truth) = caster.sweep(&ego, index, seed, self.threads());

@@ -67,7 +67,7 @@ impl Ego {
         let pace = Pace::Town;
         match self {
             Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
-            Ego::Standing => Plan { path: Path::standing(0.0, -LANE, 0.0), crossing, pace },
+            Ego::Standing => Plan { path: Path::stationary(0.0, -LANE, 0.0), crossing, pace },
             Ego::Straight { speed } => Plan { path: start(speed), crossing, pace },
             Ego::StopAndGo { speed } => {
                 let path = start(speed).then(0.1 * duration_s, 0.0, 0.0);

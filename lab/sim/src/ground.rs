@@ -176,7 +176,7 @@ impl Ground {
 
     /// Pose of something standing at (x, y) facing `yaw` on four feet `base` apart (length, width,
     /// m); upright if `base` is zero.
-    pub fn stand(&self, x: f64, y: f64, yaw: f64, base: [f64; 2]) -> Pose {
+    pub fn standing_pose(&self, x: f64, y: f64, yaw: f64, base: [f64; 2]) -> Pose {
         if base[0] == 0.0 {
             return Pose::planar(x, y, self.height(x, y), yaw);
         }
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn vehicles_lie_in_the_slope() {
         let g = Ground::street([0.03, 0.03], 0.01, 0.0, 100.0, 0.0);
-        let p = g.stand(1.0, 2.0, 0.7, [2.8, 1.6]);
+        let p = g.standing_pose(1.0, 2.0, 0.7, [2.8, 1.6]);
         let up = p.rotation * DVec3::Z;
         let normal = DVec3::new(-0.03, -0.01, 1.0).normalize();
         assert!((up - normal).length() < 1e-9);

@@ -35,7 +35,7 @@ mod scene;
 mod scenery;
 mod sensor;
 mod shape;
-mod still;
+mod static_scene;
 mod street;
 mod target;
 mod traffic;

@@ -150,7 +150,7 @@ impl Object {
     /// `street_from_object` at a time, s.
     pub fn pose(&self, ground: &Ground, t: f64) -> Pose {
         let state = self.path.at(t);
-        let mut pose = ground.stand(state.x, state.y, state.yaw, self.base);
+        let mut pose = ground.standing_pose(state.x, state.y, state.yaw, self.base);
         pose.translation += pose.rotation * DVec3::new(0.0, 0.0, 0.5 * self.size[2]);
         pose
     }
@@ -161,8 +161,8 @@ impl Object {
     }
 
     /// Whether neither it nor any of its parts ever moves.
-    pub fn is_still(&self) -> bool {
-        self.path.is_still() && self.parts.iter().all(|part| part.swing.is_none())
+    pub fn is_static(&self) -> bool {
+        self.path.is_static() && self.parts.iter().all(|part| part.swing.is_none())
     }
 
     /// Radius of the sphere around its centre that contains all of it, m.

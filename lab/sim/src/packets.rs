@@ -37,18 +37,18 @@ impl OusterPackets {
 
     /// Time of a column after the revolution's first one, ns.
     fn column_ns(&self, column: usize) -> u64 {
-        (self.sensor.turn_s * 1e9 * column as f64 / self.sensor.columns as f64) as u64
+        (self.sensor.period_s * 1e9 * column as f64 / self.sensor.columns as f64) as u64
     }
 
     /// The sensor's metadata.
     pub fn metadata(&self) -> String {
-        let Sensor { beams, columns, turn_s, .. } = &self.sensor;
+        let Sensor { beams, columns, period_s, .. } = &self.sensor;
         // A column's azimuth is that of its centre.
         let half = 180.0 / *columns as f64;
         let list = |numbers: Vec<f64>| format!("{numbers:?}");
         let elevations = list(beams.iter().map(|b| b.elevation.to_degrees()).collect());
         let azimuths = list(beams.iter().map(|b| half - b.azimuth.to_degrees()).collect());
-        let hz = (1.0 / turn_s).round();
+        let hz = (1.0 / period_s).round();
         format!(
             "{{\"prod_line\": \"simulated OS1-128\", \"lidar_mode\": \"{columns}x{hz}\",\n\
              \"udp_profile_lidar\": \"RNG19_RFL8_SIG16_NIR16\",\n\

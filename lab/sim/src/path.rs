@@ -97,7 +97,7 @@ impl Path {
     }
 
     /// Standing still at this place.
-    pub fn standing(x: f64, y: f64, yaw: f64) -> Path {
+    pub fn stationary(x: f64, y: f64, yaw: f64) -> Path {
         Path::from(State { x, y, yaw, speed: 0.0 })
     }
 
@@ -196,7 +196,7 @@ impl Path {
     }
 
     /// Returns whether it never moves.
-    pub fn is_still(&self) -> bool {
+    pub fn is_static(&self) -> bool {
         let rests = |c: &Course| c.acceleration == 0.0 && c.jerk == 0.0;
         self.legs.iter().all(|leg| leg.from.speed == 0.0 && rests(&leg.course))
     }
@@ -208,7 +208,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     #[test]
-    fn brakes_turns_and_goes_on() {
+    fn brakes_turns_and_continues() {
         let start = State { x: 1.0, y: 2.0, yaw: 0.0, speed: 10.0 };
         let path = Path::from(start).then(1.0, 0.0, 0.0).then(2.0, -2.5, 0.0);
         let path = path.then(8.0 * FRAC_PI_2 / 5.0, 0.0, 0.125);
@@ -286,7 +286,7 @@ mod tests {
         let stopped = 0.5 + (8.0 * FRAC_PI_2) / 6.0 + 1.0 + 2.5;
         assert_eq!((path.at(stopped).speed, path.at(stopped + 0.9).speed), (0.0, 0.0));
         assert!(path.at(stopped - 0.1).speed > 0.0 && path.at(stopped + 1.1).speed > 0.0);
-        assert!(!path.is_still());
+        assert!(!path.is_static());
     }
 
     #[test]

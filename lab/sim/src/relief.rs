@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn as_by_tiny_steps() {
+    fn equals_integration_in_tiny_steps() {
         let (relief, mut rng, mut met) = (relief(), Rng::new(4), 0);
         for _ in 0..3000 {
             let o = DVec3::new(rng.range(-30.0, 10.0), rng.range(-3.0, 3.0), 2.6);
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_are_continuous_and_no_steeper_than_they_say() {
+    fn heights_are_continuous_and_within_their_stated_slope() {
         let (relief, mut rng) = (relief(), Rng::new(5));
         for _ in 0..5000 {
             let [x, y] = [0; 2].map(|_| rng.range(-60.0, 60.0));

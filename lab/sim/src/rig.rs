@@ -126,7 +126,7 @@ impl SensorRig {
             let [x, y, lean] = places[i];
             let roll = DQuat::from_rotation_x(f64::to_radians(lean));
             Mount {
-                sensor: Sensor { turn_s: 1.0 / rates[i], ..Sensor::hdl32() },
+                sensor: Sensor { period_s: 1.0 / rates[i], ..Sensor::hdl32() },
                 vehicle_from_sensor: Pose::new(roll, DVec3::new(x, y, 1.57)),
                 phase_s: phases[i],
             }
@@ -140,7 +140,7 @@ impl SensorRig {
     pub fn hdl32x4_full() -> SensorRig {
         let mut rig = SensorRig::hdl32x4();
         for Mount { sensor, .. } in &mut rig.mounts {
-            sensor.columns = (sensor.turn_s / HDL32_FIRING_S).round() as usize;
+            sensor.columns = (sensor.period_s / HDL32_FIRING_S).round() as usize;
         }
         rig
     }
@@ -191,9 +191,9 @@ impl SensorRig {
     pub(crate) fn firings(&self, index: usize) -> Vec<Firing> {
         let mut all = Vec::new();
         for (number, mount) in self.mounts.iter().enumerate() {
-            let Sensor { columns, turn_s, .. } = mount.sensor;
-            let first = mount.phase_s - 0.5 * turn_s;
-            let per_s = columns as f64 / turn_s;
+            let Sensor { columns, period_s, .. } = mount.sensor;
+            let first = mount.phase_s - 0.5 * period_s;
+            let per_s = columns as f64 / period_s;
             // The first firing not before the boundary of two sweeps.
             let from = |sweeps: f64| ((sweeps / 10.0 - first) * per_s - 0.5).ceil() as i64;
             for k in from(index as f64 - 0.5)..from(index as f64 + 0.5) {
@@ -256,9 +256,9 @@ mod tests {
                 assert!(firings.windows(2).all(|f| f[0].offset_s <= f[1].offset_s));
                 for f in firings {
                     assert!((-0.05 - 1e-12..0.05).contains(&f.offset_s), "{name}: {f:?}");
-                    let Sensor { columns, turn_s, .. } = rig.mounts[f.mount].sensor;
+                    let Sensor { columns, period_s, .. } = rig.mounts[f.mount].sensor;
                     let t = stamp_s(index) + f.offset_s;
-                    let step = turn_s / columns as f64;
+                    let step = period_s / columns as f64;
                     let gap = before[f.mount].map_or(step, |b: f64| t - b);
                     assert!((gap - step).abs() < 1e-9, "{name}: {gap} after the firing before");
                     before[f.mount] = Some(t);

@@ -111,7 +111,7 @@ impl Scene {
     fn state(&self, object: &Object, t: f64) -> ObjectState {
         const STEP_S: f64 = 5e-4;
         let at = |t: f64| self.world_from_street * object.pose(&self.ground, t);
-        let still = object.path.is_still();
+        let still = object.path.is_static();
         let moved = || (at(t + STEP_S).translation - at(t - STEP_S).translation) / (2.0 * STEP_S);
         ObjectState {
             id: object.id,

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_goes_through_what_clutters_a_street() {
+    fn no_object_passes_through_street_clutter() {
         for seed in 0..10 {
             let of = |scenery: Scenery| scenery.draw(seed, Ego::Any, 6.0, 1.0);
             let (plain, _) = of(Scenery::Street);
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_street_creeps_and_strolls() {
+    fn slow_streets_have_creeping_cars_and_strolling_people() {
         let of = |scenery: Scenery, seed| scenery.draw(seed, Ego::Any, 6.0, 1.0).0.objects;
         let (mut speeds, mut people) = (Vec::new(), [0, 0]);
         for seed in 0..5 {
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn seeds_draw_every_place() {
+    fn seeds_cover_every_place() {
         let drawn: BTreeSet<_> = (0..60).filter_map(|n| Scenery::Outskirts.place(n)).collect();
         assert_eq!(drawn.len(), Place::ALL.len());
         assert_eq!(Scenery::Street.place(1), None);

@@ -20,7 +20,7 @@ pub struct Sensor {
     /// Firings per revolution.
     pub columns: usize,
     /// Duration of a revolution, s.
-    pub turn_s: f64,
+    pub period_s: f64,
     /// Minimum and maximum reported range, m.
     pub range: [f64; 2],
     /// Standard deviation of the range, m.
@@ -93,7 +93,7 @@ impl Sensor {
         Sensor {
             beams: (0..64).map(&mut beam).collect(),
             columns: 2048,
-            turn_s: 0.1,
+            period_s: 0.1,
             range: [1.0, 120.0],
             range_noise: 0.02,
             angle_noise: 3e-4,

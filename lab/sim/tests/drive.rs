@@ -31,7 +31,7 @@ fn in_world<'a>(drive: &'a Drive, sweep: &'a SimSweep) -> impl Iterator<Item = (
 }
 
 #[test]
-fn threads_do_not_show() {
+fn thread_count_does_not_affect_results() {
     let make = |threads: usize| {
         let options = Options { threads, ..options(Ego::Any, 2) };
         Drive::new(11, options).collect::<Vec<_>>()
@@ -149,7 +149,7 @@ fn no_ray_is_missed() {
     let pose = raywake_core::pose::Pose::new(glam::DQuat::IDENTITY, centre);
     let ball = Shape::ellipsoid(radius, radius, radius);
     scene.put(Class::Fixture, ball, pose, Surface::matt(0.5));
-    let drive = ideal(scene, Path::standing(0.0, 0.0, 0.0));
+    let drive = ideal(scene, Path::stationary(0.0, 0.0, 0.0));
     let sensor = Sensor::ideal();
     let eye = DVec3::new(0.0, 0.0, SensorRig::ideal().origin.z);
     let rays = (0..sensor.columns).flat_map(|c| sensor.beams.iter().map(move |b| (c, b)));
@@ -215,12 +215,12 @@ fn movers() -> Scene {
     scene.add(models::van, Path::from(at(14.0, -6.0, 3.0, 6.0)), 2);
     scene.add(models::cyclist, Path::from(at(-7.0, 3.0, 0.0, 4.0)), 3);
     scene.add(models::pedestrian, Path::from(at(5.0, -4.0, 1.0, 1.4)), 4);
-    scene.add_car(Path::standing(-8.0, -5.0, 0.2), 5);
+    scene.add_car(Path::stationary(-8.0, -5.0, 0.2), 5);
     scene
 }
 
 #[test]
-fn what_hangs_in_the_air_is_no_object() {
+fn overhanging_structure_is_not_an_object() {
     for clutter in Clutter::ALL {
         let options = Options { clutter, ..options(Ego::Straight { speed: 8.0 }, 20) };
         let [one, two] =
@@ -294,7 +294,7 @@ fn velocity_is_the_pose_s_derivative() {
 }
 
 #[test]
-fn flow_is_the_material_s_displacement() {
+fn flow_is_the_displacement_of_the_material() {
     let mut scene = movers();
     let at = |x: f64, y: f64, yaw: f64, speed: f64| State { x, y, yaw, speed };
     scene.add(models::truck, Path::from(at(20.0, 9.0, 0.3, 7.0)).then(9.0, -0.5, 0.03), 6);

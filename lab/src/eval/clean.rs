@@ -30,7 +30,7 @@ pub struct Args {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Counted {
     all: u64,
-    looked_at: u64,
+    examined: u64,
     removed: u64,
 }
 
@@ -42,7 +42,7 @@ impl Tally {
     fn add(&mut self, moves: bool, label: u32) {
         let counted = &mut self.0[usize::from(moves)];
         counted.all += 1;
-        counted.looked_at += u64::from(label != UNLABELLED);
+        counted.examined += u64::from(label != UNLABELLED);
         counted.removed += u64::from(label == MOVING);
     }
 
@@ -51,9 +51,9 @@ impl Tally {
         let [still, moving] = self.0;
         let share = |part: u64, of: u64| part as f64 / of.max(1) as f64;
         [
-            share(still.looked_at - still.removed, still.looked_at),
-            share(moving.removed, moving.looked_at),
-            share(moving.removed, moving.looked_at + still.removed),
+            share(still.examined - still.removed, still.examined),
+            share(moving.removed, moving.examined),
+            share(moving.removed, moving.examined + still.removed),
         ]
     }
 
@@ -66,7 +66,7 @@ impl Tally {
             "{} static and {} moving returns, {} and {} of them inspected\n\
              static kept {kept:.2} %, dynamic removed {removed:.2} %, geometric mean {mean:.2} %, \
              IoU {iou:.2} %\nremoved of all moving returns: {all:.2} %\n",
-            still.all, moving.all, still.looked_at, moving.looked_at
+            still.all, moving.all, still.examined, moving.examined
         )
     }
 }

@@ -83,7 +83,7 @@ pub struct Collector<'a> {
     /// Columns of the first sweep in the second's window, where the filter sees them.
     before: Vec<Column>,
     /// Whether each column of the first sweep's window has flow and is not reported as moving.
-    stands: Vec<bool>,
+    is_static: Vec<bool>,
 }
 
 impl<'a> Collector<'a> {
@@ -98,8 +98,8 @@ impl<'a> Collector<'a> {
         margin_m: f64,
     ) -> Collector<'a> {
         let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
-        let (before, stands) = (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
-        Collector { profile, rig, filter, view, margin_m, objects, grid, before, stands }
+        let (before, is_static) = (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
+        Collector { profile, rig, filter, view, margin_m, objects, grid, before, is_static }
     }
 
     /// Edge of a column, m.
@@ -126,7 +126,7 @@ impl<'a> Collector<'a> {
         shift(&step, &self.grid.columns, &mut self.before);
         let present = self.present(seen);
         let mut rows = Vec::with_capacity(seen.columns.len());
-        self.stands.fill(false);
+        self.is_static.fill(false);
         for flow in &seen.columns {
             let column = |window: &Window| {
                 let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
@@ -142,7 +142,7 @@ impl<'a> Collector<'a> {
             let score = score(&step, &self.filter, &self.before, column);
             let row = self.row(seen, flow, owner, occupied.count_ones() as u8, score);
             let row = Row { below: hit == Some(None) && owner.is_some(), ..row };
-            self.stands[here] = !row.is_put_out_moving();
+            self.is_static[here] = !row.is_reported_moving();
             rows.push(row);
         }
         rows
@@ -151,10 +151,10 @@ impl<'a> Collector<'a> {
     /// Whether each return of the first sweep is reported as moving: with a velocity of
     /// [`MOVING_MPS`] or more, and together with its column if that is solid. Applies to the sweep
     /// whose rows were made last.
-    pub fn returns_put_out_moving(&self, seen: &PairData) -> Vec<bool> {
+    pub fn returns_reported_moving(&self, seen: &PairData) -> Vec<bool> {
         let moving = |(flow, &column): (&PointFlow, &u32)| {
             let [x, y] = flow.velocity_world_mps.map(f64::from);
-            let with_column = column == NONE || !self.stands[column as usize];
+            let with_column = column == NONE || !self.is_static[column as usize];
             x.hypot(y) >= MOVING_MPS && with_column
         };
         seen.points.iter().zip(&self.grid.of_point).map(moving).collect()
@@ -208,7 +208,7 @@ impl<'a> Collector<'a> {
             age: flow.age,
             dt: seen.dt_s as f32,
             probability: flow.probability,
-            ..Row::told_by(flow.cues)
+            ..Row::from_cues(flow.cues)
         }
     }
 
@@ -280,7 +280,7 @@ mod tests {
 
     /// A truck of 8 m that moves 0.6 m, with returns within its footprint and beside it.
     #[test]
-    fn what_stands_beneath_a_truck_is_not_the_truck() {
+    fn static_structure_beneath_a_truck_is_not_the_truck() {
         let source = Simulated::new(1, 2);
         let [now, then] = [0, 1].map(|n| source.pose(n));
         let ahead = now.rotation * DVec3::new(0.6, 0.0, 0.0);

@@ -251,8 +251,8 @@ impl<'a> Judges<'a> {
         let exact = self.exact.as_ref().map(|e| e.returns(&seen.first)).transpose()?;
         self.points.pair(seen, present, exact.as_deref())?;
         let rows = self.collector.rows(seen, exact.as_deref());
-        let put_out = self.collector.returns_put_out_moving(seen);
-        self.returns.pair(seen, present, exact.as_deref(), &put_out)?;
+        let reported = self.collector.returns_reported_moving(seen);
+        self.returns.pair(seen, present, exact.as_deref(), &reported)?;
         self.panels.consider(seen, &rows, present);
         Ok(rows)
     }

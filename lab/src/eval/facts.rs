@@ -94,7 +94,7 @@ impl Facts {
         let text = fs::read_to_string(path).map_err(Error::reading(path))?;
         let facts: Facts = serde_json::from_str(&text)
             .map_err(|e| Error::input(path, format!("line {}", e.line()), e.to_string()))?;
-        if !facts.scores.iter().all(PointScores::are_whole) {
+        if !facts.scores.iter().all(PointScores::are_complete) {
             return Err(Error::input(path, "key `scores`", "is from another version"));
         }
         Ok(facts)

@@ -5,7 +5,7 @@ use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::statistics::{Sorted, Weight};
 use super::tables::{GRID, RECALL, stages};
 use super::tally::{SETTLED, Tally};
-use crate::curve::{Curve, Operating};
+use crate::curve::{Curve, OperatingPoint};
 use crate::report::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
@@ -38,7 +38,7 @@ fn title(group: ClassGroup, motion: MotionGroup) -> String {
 /// Figure 3.6: precision over recall of the background filter.
 pub fn precision_recall(curve: Option<&Curve>) -> Chart {
     let mark =
-        |p: Operating, label: &str| Mark { at: [p.recall, p.precision], label: label.into() };
+        |p: OperatingPoint, label: &str| Mark { at: [p.recall, p.precision], label: label.into() };
     let series = curve.map(|curve| {
         let all: Vec<_> = curve.points().collect();
         let thin = all.len().div_ceil(4 * POINTS).max(1);

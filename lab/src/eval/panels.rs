@@ -42,7 +42,7 @@ struct Candidate {
 const PICTURES: [&str; 4] = ["worst", "best", "busiest stationary", "busiest driving"];
 /// A vehicle slower than this is stationary, m/s: twice the speed that poses with an error of 1 cm
 /// on every sweep give a stationary one.
-const STANDING_MPS: f64 = 0.3;
+const STATIONARY_MPS: f64 = 0.3;
 
 /// The sweeps to be drawn, so far.
 #[derive(Default)]
@@ -59,7 +59,7 @@ impl Panels {
         let mean_m = labelled().map(|r| error_m(r).min(CLIP_M)).sum::<f32>() / count as f32;
         let moving = labelled().filter(|r| r.is_moving() && r.age >= AGE).count() as f32;
         let driven = seen.then.translation - seen.first.world_from_vehicle.translation;
-        let stands = driven.length() < STANDING_MPS * seen.dt_s;
+        let stands = driven.length() < STATIONARY_MPS * seen.dt_s;
         let busy = |this: bool| if this { moving } else { f32::NEG_INFINITY };
         let merits = [mean_m, -mean_m, busy(stands), busy(!stands)];
         for (kept, merit) in self.0.iter_mut().zip(merits).filter(|m| m.1.is_finite()) {

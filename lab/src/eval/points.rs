@@ -37,8 +37,8 @@ pub struct PointScores {
 
 impl PointScores {
     /// Whether the scores are complete; those read from a file need not be.
-    pub fn are_whole(&self) -> bool {
-        self.accuracy.is_whole() && self.bucketed.is_whole() && self.three_way.is_whole()
+    pub fn are_complete(&self) -> bool {
+        self.accuracy.is_complete() && self.bucketed.is_complete() && self.three_way.is_complete()
     }
 
     /// Adds what was counted elsewhere.
@@ -85,7 +85,7 @@ impl Points {
         let pair = Pair { points, second_from_first: seen.then.inverse() * now };
         let ours = seen.points.iter().map(|f| displacement(f, &now, seen.dt_s)).collect();
         let estimates: [Vec<[f32; 3]>; 3] =
-            [ours, reference::standing(&pair), reference::rounded(&pair, self.cell_m as f32)];
+            [ours, reference::zero_motion(&pair), reference::rounded(&pair, self.cell_m as f32)];
         for (scores, estimate) in self.scores.iter_mut().zip(&estimates) {
             let scored = pair
                 .score(estimate, &Rules::OFFICIAL)

@@ -211,11 +211,11 @@ row! {
 }
 
 /// Declares which columns are cues; the compiler checks that none is missing.
-macro_rules! told {
+macro_rules! cue_columns {
     ($($cue:ident),*) => {
         impl Row {
             /// A row with nothing but the cues of P(moves).
-            pub fn told_by(cues: Cues) -> Row {
+            pub fn from_cues(cues: Cues) -> Row {
                 Row { $($cue: cues.$cue,)* ..Row::default() }
             }
 
@@ -227,7 +227,7 @@ macro_rules! told {
     };
 }
 
-told!(margin, share, residual, returns, certainty, worn, fresh, misfit, could_move, stands);
+cue_columns!(margin, share, residual, returns, certainty, worn, fresh, misfit, could_move, stands);
 
 impl Row {
     /// Whether the labelled object moves.
@@ -258,7 +258,7 @@ impl Row {
 
     /// Whether it was reported as moving: with a displacement and a velocity of [`MOVING_MPS`] or
     /// more.
-    pub fn is_put_out_moving(&self) -> bool {
+    pub fn is_reported_moving(&self) -> bool {
         let by_velocity = f64::from(self.velocity_x.hypot(self.velocity_y)) >= MOVING_MPS;
         by_velocity && self.is_moving_by_flow()
     }
@@ -269,7 +269,7 @@ impl Row {
     }
 
     /// Whether class and motion are in range; those read from a file need not be.
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         usize::from(self.class) < CLASSES.len() && self.motion <= 2
     }
 }
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn classes_are_the_kinds() {
+    fn classes_match_kinds() {
         for kind in Kind::ALL {
             assert_eq!(CLASSES[class_of(kind) as usize], format!("{kind:?}"));
         }

@@ -47,7 +47,7 @@ pub fn read(path: &Path, mut each: impl FnMut(&[Row])) -> Result<(), Error> {
         let batch = batch.map_err(|e| broken(&e))?;
         let rows = rows(&batch)
             .map_err(|column| Error::input(path, format!("column `{column}`"), "is missing"))?;
-        if let Some(row) = rows.iter().find(|r| !r.is_sound()) {
+        if let Some(row) = rows.iter().find(|r| !r.is_valid()) {
             let what = format!("class {}, motion {}: unknown", row.class, row.motion);
             return Err(Error::input(path, format!("sweep {}", row.sweep), what));
         }

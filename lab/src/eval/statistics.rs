@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_no_number() {
+    fn zero_and_nan() {
         let none = sorted(&[]);
         assert!(none.quantile(0.5).is_nan() && none.mean().is_nan());
         assert!(none.share_below(1.0).is_nan() && none.count() == 0);

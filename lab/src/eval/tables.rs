@@ -4,7 +4,7 @@ use super::facts::Facts;
 use super::groups::{ClassGroup, MotionGroup};
 use super::statistics::Weight;
 use super::tally::Tally;
-use crate::curve::{Curve, Operating};
+use crate::curve::{Curve, OperatingPoint};
 use crate::report::{Cell, Table, TableRow};
 use raywake::order_statistics::Spread;
 use raywake::statistics::BUDGET_MS;
@@ -84,7 +84,7 @@ fn published(group: ClassGroup, count: u64, numbers: &[(f64, usize)]) -> TableRo
 
 /// The filter at its own threshold and at the dissertation's recall.
 pub fn filter(curve: Option<&Curve>) -> Table {
-    let row = |name: &str, p: Option<Operating>| {
+    let row = |name: &str, p: Option<OperatingPoint>| {
         let values = p.map_or([f64::NAN; 3], |p| [p.recall, p.background_accuracy, p.precision]);
         TableRow::new(
             [Cell::from(name)].into_iter().chain(values.map(|v| Cell::Number(100.0 * v, 1))),

@@ -149,7 +149,7 @@ fn a_simulated_drive() {
 }
 
 #[test]
-fn boxes_where_no_truth_tells() {
+fn boxes_where_truth_is_unknown() {
     let folder = Scratch::new();
     let out = folder.path().join("out");
     let drive = drive(folder.path());

@@ -4,7 +4,7 @@
 //! so a lesson takes all pairs of a square as wide as the search: each solid cell of an object with
 //! the cell it went to and with one other, and one in a hundred of the background's cells likewise.
 
-use super::network::{CellPair, Lesson, SEEN};
+use super::network::{CellPair, SEEN, TrainingSample};
 use super::occupancy::{BORDER, SIDE, Symmetry};
 use super::pairs::{CellOwner, FlowPair};
 use raywake_core::params::SIDE as SEARCH;
@@ -15,7 +15,7 @@ const OF_BACKGROUND: f64 = 0.01;
 
 impl FlowPair {
     /// A lesson around one of the pair's `sources`.
-    pub fn lesson(&self, source: usize, rng: &mut Rng) -> Lesson {
+    pub fn sample(&self, source: usize, rng: &mut Rng) -> TrainingSample {
         let symmetry = Symmetry((rng.bits() & 7) as u8);
         let half = (SEARCH / 2) as i32;
         let first = [source / SIDE, source % SIDE].map(|n| n as i32 - half);
@@ -45,7 +45,7 @@ impl FlowPair {
                 pairs.push(CellPair { first: n, second, matching: false });
             }
         }
-        Lesson { maps, pairs, classes: self.classes(&cells) }
+        TrainingSample { maps, pairs, classes: self.classes(&cells) }
     }
 
     /// Whether pairs are drawn from a cell.

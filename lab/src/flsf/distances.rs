@@ -24,7 +24,7 @@ const NEAR_TO_FAR: &[Colour] = &[[53, 42, 135], [15, 118, 200], [55, 184, 157], 
 const FAR: Colour = [192, 24, 43];
 
 /// One cell and its surroundings.
-struct Around {
+struct Neighbourhood {
     /// Whether there is a return in each cell of the second sweep.
     solid: Vec<bool>,
     /// Feature distance of each, by row and column; `None` beyond the window.
@@ -37,7 +37,7 @@ struct Around {
 pub struct Distances {
     /// Number of moving solid cells of the kind: the pair with the most is drawn.
     pub cells: usize,
-    around: Vec<Around>,
+    around: Vec<Neighbourhood>,
 }
 
 /// Solid cells of moving objects of a kind.
@@ -61,7 +61,7 @@ impl Distances {
         both: [&Encoded; 2],
     ) -> Distances {
         let chosen = (0..CELLS).map(|n| cells[n * (cells.len() - 1) / (CELLS - 1)]);
-        let around = chosen.map(|cell| Around::of(pair, cell, features, both)).collect();
+        let around = chosen.map(|cell| Neighbourhood::of(pair, cell, features, both)).collect();
         Distances { cells: cells.len(), around }
     }
 
@@ -81,8 +81,8 @@ impl Distances {
     }
 }
 
-impl Around {
-    fn of(pair: &FlowPair, cell: usize, features: &Features, both: [&Encoded; 2]) -> Around {
+impl Neighbourhood {
+    fn of(pair: &FlowPair, cell: usize, features: &Features, both: [&Encoded; 2]) -> Neighbourhood {
         let row = features.costs(both, &[cell as u32])[0];
         let steps =
             (0..SEARCH * SEARCH).map(|n| [n / SEARCH, n % SEARCH].map(|d| d as i32 - REACH));
@@ -92,7 +92,7 @@ impl Around {
             let inside = |n: i32| (0..SIDE as i32).contains(&n);
             (inside(i) && inside(j)).then_some(i as usize * SIDE + j as usize)
         };
-        Around {
+        Neighbourhood {
             solid: steps
                 .clone()
                 .map(|s| index(s).is_some_and(|n| pair.columns[1][n][1] != 0))

@@ -5,7 +5,7 @@ use super::conclude::conclude;
 use super::matching::{Constancy, Features};
 use super::network::Flsf;
 use super::outcome::{Compared, Outcome, walk};
-use super::weights::TrainedNumbers;
+use super::weights::TrainedParameters;
 use crate::train::recorded::Recorded;
 use raywake::args::Learned;
 use raywake::weight_files::WeightFiles;
@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let profile = Profile::dissertation();
     let learned = Learned { constancy: args.constancy.clone(), ..Learned::default() };
     let tables = WeightFiles::read(&learned, &profile)?.tables(&profile)?;
-    let trained = TrainedNumbers::read(&args.weights, Flsf::new(false).numbers())?;
+    let trained = TrainedParameters::read(&args.weights, Flsf::new(false).numbers())?;
     let methods = (Constancy::new(tables), Features::new(trained.numbers));
     let mut outcome = Outcome::default();
     let mut rng = Rng::new(48);

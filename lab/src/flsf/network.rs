@@ -45,7 +45,7 @@ pub struct CellPair {
 
 /// A training sample: a place and what the network is to learn there.
 #[derive(Clone, Debug)]
-pub struct Lesson {
+pub struct TrainingSample {
     /// Occupancy of the same square of both sweeps.
     pub maps: [FeatureMap; 2],
     /// Pairs of their encodings.
@@ -89,7 +89,7 @@ impl Flsf {
     pub fn learn(
         &self,
         numbers: &[f32],
-        lesson: &Lesson,
+        sample: &TrainingSample,
         weights: [f32; SCORES],
         rng: &mut Rng,
         into: &mut [f32],
@@ -97,12 +97,13 @@ impl Flsf {
         let (of_encoder, of_classifier) = numbers.split_at(self.encoder.numbers());
         let (into_encoder, into_classifier) = into.split_at_mut(of_encoder.len());
         let tapes =
-            lesson.maps.each_ref().map(|map| self.encoder.forward(of_encoder, map.clone(), rng));
+            sample.maps.each_ref().map(|map| self.encoder.forward(of_encoder, map.clone(), rng));
         let (matching, [mut first, second]) =
-            of_pairs(tapes.each_ref().map(|t| t.output()), &lesson.pairs);
-        let told = self.classifier.forward(of_classifier, tapes[0].output().clone(), rng);
-        let (classes, slope) = of_classes(told.output(), &lesson.classes, weights);
-        let passed = self.classifier.backward(of_classifier, &told, slope, into_classifier, true);
+            of_pairs(tapes.each_ref().map(|t| t.output()), &sample.pairs);
+        let classified = self.classifier.forward(of_classifier, tapes[0].output().clone(), rng);
+        let (classes, slope) = of_classes(classified.output(), &sample.classes, weights);
+        let passed =
+            self.classifier.backward(of_classifier, &classified, slope, into_classifier, true);
         first.iter_mut().zip(passed.unwrap_or_default()).for_each(|(s, p)| *s += p);
         for (tape, slope) in tapes.iter().zip([first, second]) {
             self.encoder.backward(of_encoder, tape, slope, into_encoder, false);

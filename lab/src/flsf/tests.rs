@@ -4,7 +4,7 @@ use super::occupancy::{BORDER, OccupancyMap, SIDE, Symmetry, WIDE, wide_grid};
 use super::outcome::{Outcome, walk};
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
 use super::train::{Fit, Material};
-use super::weights::{self, TrainedNumbers};
+use super::weights::{self, TrainedParameters};
 use crate::learning::Adam;
 use crate::scratch::Scratch;
 use crate::train::simulated::Simulated;
@@ -19,7 +19,7 @@ fn scene() -> Simulated {
     let mut scene = Scene::empty();
     let way = |x, y, yaw, speed| Path::from(State { x, y, yaw, speed });
     scene.add_car(way(12.0, 0.0, std::f64::consts::FRAC_PI_2, 9.0), 1);
-    scene.add_car(Path::standing(5.0, -8.0, 0.3), 2);
+    scene.add_car(Path::stationary(5.0, -8.0, 0.3), 2);
     let options = Options { sweeps: 3, rig: SensorRig::ideal(), ..Options::default() };
     Simulated::new(Drive::through(scene, way(0.0, 0.0, 0.0, 6.0), 1, options))
 }
@@ -92,7 +92,7 @@ fn lessons_match_where_cells_went() {
     for n in 0..16 {
         let sources = pair.sources();
         let source = sources[n * 7 % sources.len()];
-        let lesson = pair.lesson(source, &mut rng.clone());
+        let sample = pair.sample(source, &mut rng.clone());
         let symmetry = Symmetry((rng.bits() & 7) as u8);
         let cell = |place: usize| {
             let at = symmetry.of([place / SEARCH, place % SEARCH], SEARCH);
@@ -102,17 +102,17 @@ fn lessons_match_where_cells_went() {
                 .map(|(s, a)| *s as i32 - half + a as i32)
                 .fold(0, |all, n| all * SIDE as i32 + n) as usize
         };
-        for p in &lesson.pairs {
+        for p in &sample.pairs {
             let [a, b] = [cell(p.first), cell(p.second)];
             let step = pair.step(a).unwrap();
             let went = a as i32 + step[0] * SIDE as i32 + step[1];
             assert_eq!(went as usize == b, p.matching);
             seen[usize::from(p.matching)] += 1;
         }
-        assert_eq!(lesson.classes.len(), (SEARCH - 2).pow(2));
-        assert!(lesson.classes.contains(&Some(true)));
+        assert_eq!(sample.classes.len(), (SEARCH - 2).pow(2));
+        assert!(sample.classes.contains(&Some(true)));
         let wide = SEARCH + 2 * super::network::SEEN;
-        assert_eq!([lesson.maps[0].rows, lesson.maps[1].columns], [wide, wide]);
+        assert_eq!([sample.maps[0].rows, sample.maps[1].columns], [wide, wide]);
     }
     assert!(seen[0] == seen[1] && seen[0] > 50, "{seen:?}");
 }
@@ -152,13 +152,13 @@ fn training_goes_on_where_it_was() {
 
     let out = scratch.path().join("weights");
     let (numbers, provenance) = (whole.numbers, "by hand".to_string());
-    let trained = TrainedNumbers { numbers, provenance };
+    let trained = TrainedParameters { numbers, provenance };
     trained.write(&out).unwrap();
     let count = trained.numbers.len();
-    let again = TrainedNumbers::read(&out, count).unwrap();
+    let again = TrainedParameters::read(&out, count).unwrap();
     assert!(again.numbers == trained.numbers && again.provenance == "by hand");
     let refused = |file: &std::path::Path, count: usize| {
-        TrainedNumbers::read(file, count).map(|_| ()).unwrap_err().to_string()
+        TrainedParameters::read(file, count).map(|_| ()).unwrap_err().to_string()
     };
     assert!(refused(&out, 7).contains("another length"));
     assert!(refused(&file, 7).contains("raywake-flsf-weights"));

@@ -1,10 +1,10 @@
 //! `raywake-lab train flsf`.
 
-use super::network::{D_MAX, FEATURES, Flsf, Lesson, SCORES};
+use super::network::{D_MAX, FEATURES, Flsf, SCORES, TrainingSample};
 use super::occupancy::wide_grid;
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
-use super::weights::{self, TrainedNumbers};
-use crate::curve::{Curve, Operating};
+use super::weights::{self, TrainedParameters};
+use crate::curve::{Curve, OperatingPoint};
 use crate::learning::Adam;
 use crate::train::inputs::{Inputs, Visit};
 use crate::train::report::{Counts, RECALLS};
@@ -56,7 +56,7 @@ struct Report {
     losses: Vec<[f32; 2]>,
     /// How well distances separate matching pairs from others, on held-out drives.
     matching_auc: f64,
-    matching: Vec<Operating>,
+    matching: Vec<OperatingPoint>,
 }
 
 /// Trains, writes and reports.
@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Counts { positive: sources, negative: 1 }.both(part, "cells of labelled objects", "")?;
     }
     let fitted = Fit::of(&training, args.inputs.seed, args.steps, args.checkpoint.as_deref())?;
-    let trained = TrainedNumbers {
+    let trained = TrainedParameters {
         numbers: fitted.numbers,
         provenance: format!(
             "raywake-lab train flsf, {}, {} steps of {BATCH} lessons",
@@ -113,9 +113,9 @@ impl Material {
         (!sources.is_empty()).then_some(Material { pair, sources })
     }
 
-    fn lesson(&self, rng: &mut Rng) -> Lesson {
+    fn sample(&self, rng: &mut Rng) -> TrainingSample {
         let source = self.sources[rng.bits() as usize % self.sources.len()];
-        self.pair.lesson(source, rng)
+        self.pair.sample(source, rng)
     }
 }
 
@@ -213,8 +213,8 @@ fn gradient(
         let (mut slope, mut sums) = (vec![0.0; numbers.len()], [0.0; 2]);
         for (pair, rng) in part {
             let mut rng = rng.clone();
-            let lesson = pairs[*pair].lesson(&mut rng);
-            let losses = network.learn(numbers, &lesson, weights, &mut rng, &mut slope);
+            let sample = pairs[*pair].sample(&mut rng);
+            let losses = network.learn(numbers, &sample, weights, &mut rng, &mut slope);
             sums = [0, 1].map(|n| sums[n] + losses[n]);
         }
         (slope, sums)
@@ -237,9 +237,9 @@ fn judge(pairs: &[Material], numbers: &[f32]) -> Curve {
     let mut rng = Rng::split(0, 5 << 32);
     let mut rows = Vec::new();
     for _ in 0..JUDGED {
-        let lesson = pairs[rng.bits() as usize % pairs.len()].lesson(&mut rng);
-        let maps = lesson.maps.each_ref().map(|map| network.encoder.apply(of_encoder, map));
-        rows.extend(lesson.pairs.iter().map(|p| {
+        let sample = pairs[rng.bits() as usize % pairs.len()].sample(&mut rng);
+        let maps = sample.maps.each_ref().map(|map| network.encoder.apply(of_encoder, map));
+        rows.extend(sample.pairs.iter().map(|p| {
             let [a, b] =
                 [&maps[0].values[p.first * FEATURES..], &maps[1].values[p.second * FEATURES..]];
             let (d, _) = crate::learning::pair_loss(&a[..FEATURES], &b[..FEATURES], true, D_MAX);

@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_counted() {
+    fn invalid_entries_are_counted() {
         let mut g = Gather::default();
         g.add(&LabelRow { centre: [f64::NAN, 0.0, 0.0], ..row("a", 1) });
         g.add(&LabelRow { rotation: heading(f64::INFINITY), ..row("a", 1) });

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn another_number_of_returns() {
+    fn a_different_number_of_returns() {
         let t = Scratch::new();
         let path = t.write("labels/000000.label", [0; 10]);
         let e = read(&path, 3).unwrap_err().to_string();

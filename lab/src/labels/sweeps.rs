@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn tracks_are_cut_where_they_jump_over_ground() {
+    fn tracks_are_cut_at_jumps() {
         let at = |x: f64, yaw: f64| Pose::planar(x, 0.0, 0.0, yaw);
         // 5 m in 0.1 s is not a jump for a car, 8 m is.
         let steady = fitted((0..6).map(|f| (f, at(5.0 * f as f64, 0.0))), 0.0);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_and_frames_that_do_not_meet() {
+    fn sweeps_and_frames_that_do_not_match() {
         let labels = fitted([2, 3, 7, 8].into_iter().map(|f| (f, Pose::IDENTITY)), 0.0);
         let expected = ["2 boxes left out: their frame has no sweep", "4 sweeps without a box"];
         assert_eq!(labels.notes, expected);

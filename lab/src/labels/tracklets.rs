@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_counted() {
+    fn invalid_entries_are_counted() {
         let t = Scratch::new();
         let notes = |part: &str, instead: &str| {
             let text = file().replace(part, instead);

@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_without_a_box_breaks_no_more_than_its_own_steps() {
+    fn a_sweep_without_boxes_affects_only_its_own_steps() {
         let road = Road::of((0..8).map(|i| (0.1 * i as f64, Pose::IDENTITY)));
         let boxes =
             (0..8u64).filter(|f| *f != 4).map(|f| (f, Pose::planar(f as f64, 0.0, 0.0, 0.0)));

@@ -107,7 +107,7 @@ impl FeatureNetwork {
         for (n, layer) in self.layers.iter().enumerate().rev() {
             let own = end - layer.numbers()..end;
             end = own.start;
-            let (x, out) = (&tape.maps[n], self.undropped(tape, n + 1));
+            let (x, out) = (&tape.maps[n], self.raw_output(tape, n + 1));
             let mut under =
                 (n > 0 || below).then(|| FeatureMap::zeros(x.rows, x.columns, x.channels));
             let numbers = &numbers[own.clone()];
@@ -118,7 +118,7 @@ impl FeatureNetwork {
     }
 
     /// A map of the tape as its layer output it; dropped numbers stay zero, as do their slopes.
-    fn undropped<'a>(&self, tape: &'a FeatureTape, n: usize) -> std::borrow::Cow<'a, FeatureMap> {
+    fn raw_output<'a>(&self, tape: &'a FeatureTape, n: usize) -> std::borrow::Cow<'a, FeatureMap> {
         let map = &tape.maps[n];
         let Some(factor) = tape.kept[n].iter().copied().find(|k| *k > 0.0) else {
             return std::borrow::Cow::Borrowed(map);

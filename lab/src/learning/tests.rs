@@ -82,7 +82,7 @@ fn applied_is_forward_without_dropout() {
 }
 
 #[test]
-fn a_fifth_is_dropped_and_the_mean_stays() {
+fn dropout_drops_a_fifth_and_preserves_the_mean() {
     let network = FeatureNetwork { layers: Vec::new(), dropout: 0.2 };
     let input = FeatureMap::row(1, vec![1.0; 100_000]);
     let out = network.forward(&[], input, &mut Rng::new(3));

@@ -98,7 +98,7 @@ impl AccuracyTable {
     }
 
     /// Whether the table is complete; one read from a file need not be.
-    pub fn is_whole(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         self.cells.len() == Category::COUNT
     }
 

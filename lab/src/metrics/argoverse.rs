@@ -54,7 +54,7 @@ impl Log {
         let name = source.name().to_owned();
         let folder = match truth {
             Some(folder) => folder.join(&name),
-            None => usual_truth(&root)?,
+            None => default_truth(&root)?,
         };
         let truth = by_sweep(&folder, source.as_ref())?;
         let ground = find_ground.then(|| Ground::read(&root)).transpose()?;
@@ -134,7 +134,7 @@ impl Log {
 
 impl Estimate {
     /// Number of returns of the pair that count but that the estimator does not vouch for.
-    pub fn unvouched(&self, pair: &Pair, rules: &Rules) -> u64 {
+    pub fn marked_invalid(&self, pair: &Pair, rules: &Rules) -> u64 {
         let counts = |&(row, _): &(usize, &bool)| pair.counts(&pair.points[row], rules).is_some();
         self.valid.iter().enumerate().filter(|(_, valid)| !**valid).filter(counts).count() as u64
     }
@@ -166,7 +166,7 @@ fn same_rows(path: &Path, found: usize, points: usize) -> Result<(), Error> {
 }
 
 /// Where the grader looks for truth by default.
-fn usual_truth(root: &Path) -> Result<PathBuf, Error> {
+fn default_truth(root: &Path) -> Result<PathBuf, Error> {
     let place = || {
         let (split, log) = (root.parent()?, root.file_name()?);
         let name = format!("{}_sceneflow_feather", split.file_name()?.to_str()?);

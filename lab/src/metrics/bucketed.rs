@@ -61,7 +61,7 @@ impl BucketedEpe {
     }
 
     /// Whether the sums are complete; those read from a file need not be.
-    pub fn is_whole(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         self.table.fits(&BucketedEpe::default().table)
     }
 

@@ -38,7 +38,7 @@ struct Graded {
     from: From,
     grades: Grades,
     /// Returns that count but that the estimate does not vouch for.
-    unvouched: u64,
+    marked_invalid: u64,
 }
 
 /// Source of a row's flow.
@@ -76,10 +76,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     println!("log {}: {} pairs graded, {ground}", log.name(), pairs.len());
     for row in &rows {
         println!("\n{}", row.name);
-        if row.unvouched > 0 {
+        if row.marked_invalid > 0 {
             println!(
                 "  {} returns that count are marked invalid in it: graded anyway",
-                row.unvouched
+                row.marked_invalid
             );
         }
         print::figures(&row.grades);
@@ -92,7 +92,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
 
 fn references() -> Vec<Graded> {
     let rows: [(&str, Reference); 3] = [
-        ("reference: zero flow, the vehicle's motion known", reference::standing),
+        ("reference: zero flow, the vehicle's motion known", reference::zero_motion),
         ("reference: zero flow, the vehicle's motion unknown", reference::carried),
         ("reference: truth rounded to 0.30 m", |pair| reference::rounded(pair, CELL_M)),
     ];
@@ -101,7 +101,7 @@ fn references() -> Vec<Graded> {
 
 impl Graded {
     fn new(name: &str, from: From) -> Graded {
-        Graded { name: name.into(), from, grades: Grades::default(), unvouched: 0 }
+        Graded { name: name.into(), from, grades: Grades::default(), marked_invalid: 0 }
     }
 
     /// Counts a pair, whose truth is from the file `truth`.
@@ -111,7 +111,7 @@ impl Graded {
             From::Files(files) => {
                 let path = files[&sweep].as_path();
                 let estimate = read_estimate(path, pair)?;
-                self.unvouched += estimate.unvouched(pair, rules);
+                self.marked_invalid += estimate.marked_invalid(pair, rules);
                 (path, estimate.flow_m)
             }
         };

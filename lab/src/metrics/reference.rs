@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// No motion over ground: the figures of the vehicle's motion alone, which metrics with the
 /// vehicle's motion removed give away for free.
-pub fn standing(pair: &Pair) -> Vec<[f32; 3]> {
+pub fn zero_motion(pair: &Pair) -> Vec<[f32; 3]> {
     vec![[0.0; 3]; pair.points.len()]
 }
 

@@ -39,7 +39,7 @@ impl ThreeWayEpe {
     }
 
     /// Whether the sums are complete; those read from a file need not be.
-    pub fn is_whole(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         self.table.fits(&ThreeWayEpe::default().table)
     }
 

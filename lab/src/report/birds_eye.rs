@@ -107,8 +107,8 @@ impl Look {
         let error = column.error.filter(|e| e.is_finite());
         let colour = error.map_or(UNKNOWN, |e| colours::ramp(ERRORS, (e / self.worst) as f32));
         let [truth, estimate] = self.arrows(side);
-        let arrow = |like: Arrow, way: Option<[f64; 2]>| {
-            way.map(|way| Arrow { way: way.map(|v| v as f32), ..like })
+        let arrow = |like: Arrow, vector: Option<[f64; 2]>| {
+            vector.map(|way| Arrow { vector: way.map(|v| v as f32), ..like })
         };
         // The truth goes below, so that a matching estimate lies on top of it.
         let arrows = [arrow(truth, column.truth), arrow(estimate, column.estimate)];
@@ -119,7 +119,7 @@ impl Look {
     fn arrows(&self, side: f64) -> [Arrow; 2] {
         let width = (0.11 * self.cell_m * side / self.half_extent_m).clamp(0.8, 1.6) as f32;
         [(TRUTH, 2.4 * width), (ESTIMATE, width)].map(|(colour, width)| Arrow {
-            way: [0.0; 2],
+            vector: [0.0; 2],
             colour,
             width,
         })

@@ -139,7 +139,7 @@ fn several_sensors_are_read_back() {
 }
 
 #[test]
-fn the_azimuth_tells_an_hdl64_s_time() {
+fn azimuth_determines_the_time_of_an_hdl64() {
     let sweep = recipe("hdl64", Motion::Straight, 1).drive(0, 2).unwrap().sweep(0);
     let off = |p: &raywake_core::sweep::Point| {
         let azimuth = f64::from(p.position[1]).atan2(p.position[0].into());
@@ -257,7 +257,7 @@ fn the_same_seed_writes_the_same_bytes() {
 }
 
 #[test]
-fn what_is_in_the_way() {
+fn existing_files_are_respected() {
     let t = Scratch::new();
     let small = Recipe { density: 0.0, ..recipe("hdl64", Motion::Standing, 1) };
     let refused =
@@ -332,7 +332,7 @@ fn poses_with_the_errors_of_an_inertial_unit() {
 }
 
 #[test]
-fn the_air_and_the_place_are_told() {
+fn weather_and_place_are_recorded() {
     let t = Scratch::new();
     let recipe = Recipe {
         scenery: Scenery::Outskirts,

@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_of_nothing() {
+    fn an_empty_drive() {
         let drive = Drive::new(1, Options { sweeps: 0, density: 0.0, ..Options::default() });
         let xml = Tracklets::new(Camera::new(&drive.rig())).xml();
         assert!(xml.contains("<count>0</count>") && xml.ends_with("</boost_serialization>\n"));

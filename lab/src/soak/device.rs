@@ -18,7 +18,7 @@ use std::process::Command;
 const LOST: &str = "vkQueueSubmit 1000 -4 each";
 
 /// What pipelines are made from.
-pub struct Makes<'a> {
+pub struct PipelineConfig<'a> {
     /// Where the expensive half runs.
     pub backend: &'a BackendChoice,
     /// Weights, read and checked.
@@ -29,10 +29,10 @@ pub struct Makes<'a> {
     pub rig: Rig,
 }
 
-impl Makes<'_> {
+impl PipelineConfig<'_> {
     /// A pipeline on the requested backend.
     pub fn drive(&self) -> Result<Drive, RunError> {
-        let Makes { backend, weights, profile, rig } = self;
+        let PipelineConfig { backend, weights, profile, rig } = self;
         Ok(choose::drive(backend, weights, profile, rig)?.drive)
     }
 

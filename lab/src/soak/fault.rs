@@ -9,7 +9,7 @@ use raywake_io::source::SweepData;
 use raywake_sim::Rng;
 
 /// One in this many returns is corrupted.
-const SPOILT_EVERY: usize = 7;
+const CORRUPTED_EVERY: usize = 7;
 /// Extent of noise, m.
 const NOISE_M: f64 = 100.0;
 /// Sweeps in a gap: one second.
@@ -39,7 +39,7 @@ pub enum Fault {
     /// Twice as many returns as the profile takes.
     OverCapacity,
     /// All returns at the same place.
-    OnePlace,
+    Coincident,
     /// Returns anywhere.
     Noise,
     /// The disk that results go to is full.
@@ -54,7 +54,7 @@ impl Fault {
 
     /// Spoils the sweep that comes `after` sweeps after the middle one of its stretch. Returns
     /// whether there is a sweep at all.
-    pub fn spoil(
+    pub fn corrupt(
         self,
         after: usize,
         sweep: &mut SweepData,
@@ -72,22 +72,22 @@ impl Fault {
                 let turned = Pose::new(DQuat::from_rotation_z(3.0), DVec3::ZERO);
                 sweep.world_from_vehicle = sweep.world_from_vehicle * turned;
             }
-            _ if first => self.spoil_returns(&mut sweep.points, profile, rng),
+            _ if first => self.corrupt_returns(&mut sweep.points, profile, rng),
             _ => {}
         }
         true
     }
 
-    fn spoil_returns(self, points: &mut Vec<Point>, profile: &Profile, rng: &mut Rng) {
+    fn corrupt_returns(self, points: &mut Vec<Point>, profile: &Profile, rng: &mut Rng) {
         match self {
-            Fault::NotFinite => spoilt(points, rng),
+            Fault::NotFinite => corrupt_some(points, rng),
             Fault::Empty => points.clear(),
             Fault::OverCapacity => {
                 let (there, wanted) = (points.len(), OVER * profile.returns());
                 points.reserve(wanted);
                 (there..wanted).for_each(|n| points.push(points[n - there]));
             }
-            Fault::OnePlace => {
+            Fault::Coincident => {
                 let at = points.first().copied().unwrap_or_default();
                 points.fill(at);
             }
@@ -101,9 +101,9 @@ impl Fault {
 }
 
 /// Fills some of the returns with invalid values.
-fn spoilt(points: &mut [Point], rng: &mut Rng) {
+fn corrupt_some(points: &mut [Point], rng: &mut Rng) {
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE, -0.0];
-    for point in points.iter_mut().step_by(SPOILT_EVERY) {
+    for point in points.iter_mut().step_by(CORRUPTED_EVERY) {
         let mut draw = || odd[(rng.bits() % odd.len() as u64) as usize];
         point.position = [draw(), draw(), draw()];
         (point.intensity, point.offset_s) = (draw(), draw());

@@ -74,7 +74,7 @@ impl Findings {
     }
 
     /// Records how much memory is in use, at the end of a round of all faults.
-    pub fn weigh(&mut self, period: usize, rounds: u32) {
+    pub fn record_memory(&mut self, period: usize, rounds: u32) {
         let resident = resident_bytes().unwrap_or(0);
         self.periods[period].resident = resident;
         if rounds == IN_USE {

@@ -16,7 +16,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_linux_says() {
+    fn memory_reported_by_linux() {
         let status = "VmPeak:\t  300 kB\nVmRSS:\t  190988 kB\nThreads:\t1\n";
         assert_eq!(resident_of(status), Some(190_988 << 10));
         assert_eq!(resident_of("VmRSS: many"), None);

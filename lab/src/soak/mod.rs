@@ -13,7 +13,7 @@ mod stretch;
 mod tests;
 
 use clap::ValueEnum;
-use device::Makes;
+use device::PipelineConfig;
 use fault::{Fault, GAP};
 use findings::{Findings, PERIODS};
 use raywake::args::FlowChoice;
@@ -96,7 +96,7 @@ fn source(args: &Args) -> Result<Box<dyn Source>, raywake_io::Error> {
 struct Soak<'a> {
     args: &'a Args,
     stretches: Stretches,
-    makes: Makes<'a>,
+    config: PipelineConfig<'a>,
     drive: Drive,
     findings: Findings,
     began: Instant,
@@ -117,12 +117,12 @@ impl<'a> Soak<'a> {
             profile: profile.clone(),
         };
         let rig = source.rig().clone();
-        let makes = Makes { backend: &args.flow.backend, weights, profile, rig };
+        let config = PipelineConfig { backend: &args.flow.backend, weights, profile, rig };
         // From a separate pipeline, on the CPU.
-        let expected = stretches.run(&mut makes.scalar()?, None, &mut Latencies::default())?;
-        let (drive, began) = (makes.drive()?, Instant::now());
+        let expected = stretches.run(&mut config.scalar()?, None, &mut Latencies::default())?;
+        let (drive, began) = (config.drive()?, Instant::now());
         let findings = Findings::new(expected.digest);
-        Ok(Soak { args, stretches, makes, drive, findings, began, period: 0 })
+        Ok(Soak { args, stretches, config, drive, findings, began, period: 0 })
     }
 
     /// Runs rounds of all faults until the time is over or a signal arrives.
@@ -137,7 +137,7 @@ impl<'a> Soak<'a> {
                 self.findings.count(*fault, &clean);
             }
             rounds += 1;
-            self.findings.weigh(self.period, rounds);
+            self.findings.record_memory(self.period, rounds);
             let now = ((self.part() * PERIODS as f64) as usize).min(PERIODS - 1);
             if now > self.period || self.part() >= 1.0 {
                 println!("{}", self.findings.line(self.period));
@@ -154,7 +154,7 @@ impl<'a> Soak<'a> {
         period.sweeps += end.sweeps;
         if end.failed_over {
             self.findings.devices_failed += 1;
-            self.drive = self.makes.drive()?;
+            self.drive = self.config.drive()?;
         }
         Ok(end)
     }

@@ -68,8 +68,8 @@ impl Stretches {
         for (index, sweep) in sweeps.iter().enumerate() {
             now.clone_from(sweep);
             let after = index.checked_sub(sweeps.len() / 2);
-            let spoil = |(fault, after): (Fault, usize)| fault.spoil(after, now, profile, rng);
-            if !fault.zip(after).is_none_or(spoil) {
+            let corrupt = |(fault, after): (Fault, usize)| fault.corrupt(after, now, profile, rng);
+            if !fault.zip(after).is_none_or(corrupt) {
                 continue;
             }
             let began = Instant::now();

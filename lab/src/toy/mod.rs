@@ -16,7 +16,7 @@ use crate::report::{
 use digits::{CLASSES, DigitSets, Digits};
 use raywake_io::Error;
 use std::path::PathBuf;
-use train::{Lesson, Training};
+use train::{Objective, Training};
 
 /// `raywake-lab toy`: report.html, table 4.1 and figures 4.2 and 4.3.
 #[derive(clap::Args)]
@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 
 /// Outcome of a lesson.
 struct Learned {
-    lesson: Lesson,
+    lesson: Objective,
     /// Encodings of the test digits.
     encodings: Vec<[f32; 2]>,
     /// Share of test digits classified correctly, for each digit and for all.
@@ -53,23 +53,23 @@ struct Learned {
 /// Runs both lessons in parallel; also returns how long they took, s.
 fn both(sets: &DigitSets, training: &Training) -> ([Learned; 2], f64) {
     let begin = std::time::Instant::now();
-    let learned = |lesson: Lesson| {
+    let learned = |lesson: Objective| {
         let encoder = training.encoder(lesson, &sets.training);
-        let told = training.classifier(&encoder.of(&sets.training), &sets.training.labels);
+        let classifier = training.classifier(&encoder.of(&sets.training), &sets.training.labels);
         let encodings = encoder.of(&sets.test);
-        let right = shares(&sets.test, &told.tell(&encodings));
+        let right = shares(&sets.test, &classifier.classify(&encodings));
         Learned { lesson, encodings, right }
     };
     let both = std::thread::scope(|scope| {
-        let features = scope.spawn(|| learned(Lesson::Features));
-        [learned(Lesson::Autoencoder), features.join().expect("a working thread panicked")]
+        let features = scope.spawn(|| learned(Objective::Features));
+        [learned(Objective::Autoencoder), features.join().expect("a working thread panicked")]
     });
     (both, begin.elapsed().as_secs_f64())
 }
 
 /// Shares classified correctly.
-fn shares(digits: &Digits, told: &[u8]) -> [f64; CLASSES + 1] {
-    let right = |n: &usize| told[*n] == digits.labels[*n];
+fn shares(digits: &Digits, predicted: &[u8]) -> [f64; CLASSES + 1] {
+    let right = |n: &usize| predicted[*n] == digits.labels[*n];
     let share = |all: &[usize]| all.iter().filter(|n| right(n)).count() as f64 / all.len() as f64;
     let by_class = digits.by_class();
     let all: Vec<usize> = (0..digits.count()).collect();

@@ -44,7 +44,7 @@ fn three_digits_reach_the_optimum() {
     }
     let line = ["toy", "digits", "--out", "out", "--hidden", "20", "--steps", "2000", "--l2", "0"];
     let training = Toy::parse_from(line).args.training;
-    let encodings = training.encoder(Lesson::Features, &digits).of(&digits);
+    let encodings = training.encoder(Objective::Features, &digits).of(&digits);
     let (mut sum, mut pairs) = (0.0, 0.0f32);
     for (n, a) in encodings.iter().enumerate() {
         for (m, b) in encodings.iter().enumerate().take(n) {
@@ -54,7 +54,7 @@ fn three_digits_reach_the_optimum() {
         }
     }
     assert!(sum / pairs < 0.1, "{}", sum / pairs);
-    let told = training.classifier(&encodings, &digits.labels).tell(&encodings);
+    let told = training.classifier(&encodings, &digits.labels).classify(&encodings);
     assert_eq!(told, digits.labels);
 }
 

@@ -40,18 +40,18 @@ pub struct Training {
 
 /// What the encoder is trained for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lesson {
+pub enum Objective {
     /// To restore the picture (4.1).
     Autoencoder,
     /// Equal digits close, different ones apart (4.2).
     Features,
 }
 
-impl fmt::Display for Lesson {
+impl fmt::Display for Objective {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Lesson::Autoencoder => "autoencoder",
-            Lesson::Features => "learned features",
+            Objective::Autoencoder => "autoencoder",
+            Objective::Features => "learned features",
         })
     }
 }
@@ -78,7 +78,7 @@ pub struct DigitClassifier {
 
 impl DigitClassifier {
     /// Returns the digit of each encoding.
-    pub fn tell(&self, encodings: &[[f32; 2]]) -> Vec<u8> {
+    pub fn classify(&self, encodings: &[[f32; 2]]) -> Vec<u8> {
         let input = FeatureMap::row(2, encodings.as_flattened().to_vec());
         let scores = self.layer.forward(&self.numbers, &input);
         let best = |cell: &[f32]| (0..CLASSES).max_by(|a, b| cell[*a].total_cmp(&cell[*b]));
@@ -97,7 +97,7 @@ impl Training {
     }
 
     /// Trains an encoder.
-    pub fn encoder(&self, lesson: Lesson, digits: &Digits) -> DigitEncoder {
+    pub fn encoder(&self, lesson: Objective, digits: &Digits) -> DigitEncoder {
         let widths: Vec<usize> = [digits.pixels]
             .into_iter()
             .chain(self.hidden.iter().map(|w| usize::from(*w)))
@@ -107,7 +107,7 @@ impl Training {
         let own = encoder.numbers();
         let mut rng = Rng::split(self.seed, 2);
         let (mut network, mut numbers) = (encoder.clone(), encoder.drawn(&mut rng));
-        if lesson == Lesson::Autoencoder {
+        if lesson == Objective::Autoencoder {
             let back: Vec<usize> = widths.into_iter().rev().collect();
             let decoder = dense(&back, Activation::Sigmoid);
             numbers.extend(decoder.drawn(&mut rng));
@@ -118,8 +118,10 @@ impl Training {
         let mut state = Adam::new(numbers.len());
         for step in 0..self.steps {
             let mut slope = match lesson {
-                Lesson::Autoencoder => restored(&network, &numbers, digits, &mut rng),
-                Lesson::Features => told_apart(&network, &numbers, digits, &by_class, &mut rng),
+                Objective::Autoencoder => restored(&network, &numbers, digits, &mut rng),
+                Objective::Features => {
+                    pair_gradient(&network, &numbers, digits, &by_class, &mut rng)
+                }
             };
             slope.iter_mut().zip(&numbers).for_each(|(s, n)| *s += 2.0 * self.l2 * n);
             let left = 1.0 - step as f32 / self.steps as f32;
@@ -180,7 +182,7 @@ fn restored(network: &FeatureNetwork, numbers: &[f32], digits: &Digits, rng: &mu
 }
 
 /// Gradient of (4.2) over a batch of pairs, half of them of equal digits.
-fn told_apart(
+fn pair_gradient(
     network: &FeatureNetwork,
     numbers: &[f32],
     digits: &Digits,

@@ -122,14 +122,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_stands_for_a_large_cloud() {
+    fn a_sample_represents_a_large_cloud() {
         let cloud = walls(16_000, 0.03);
         let (fast, exact) = (entropy(&cloud), defined(&cloud));
         assert!((fast - exact).abs() < 0.01, "{fast} {exact}");
     }
 
     #[test]
-    fn crisp_is_less_and_place_does_not_matter() {
+    fn crisp_costs_less_wherever_it_is() {
         let [crisp, blurred] = [0.02, 0.1].map(|noise| entropy(&walls(4000, noise)));
         assert!(crisp < blurred - 0.3, "{crisp} {blurred}");
         let moved: Vec<Point> =

@@ -33,7 +33,7 @@ impl Alignment {
     }
 
     /// Transforms a point from the tracker's frame to the true one.
-    pub fn bring(&self, at: DVec3) -> DVec3 {
+    pub fn to_true_frame(&self, at: DVec3) -> DVec3 {
         let off = at - self.offset;
         DVec2::from_angle(-self.heading).rotate(off.truncate()).extend(off.z)
     }
@@ -90,13 +90,13 @@ pub struct Rmse {
 impl Errors {
     /// Errors of a stationary object: position and heading about their means, velocity and turn
     /// rate from zero.
-    pub fn standing(track: &[Moment]) -> Errors {
+    pub fn stationary(track: &[Moment]) -> Errors {
         let n = track.len().max(1) as f64;
         let position = track.iter().map(|m| m.position).sum::<DVec3>() / n;
         let way: DVec2 = track.iter().map(|m| DVec2::from_angle(m.heading)).sum();
         let heading = way.y.atan2(way.x);
         let still = Moment { position, heading, ..Moment::default() };
-        let mut errors = Errors { flips: leaps(track, |_| 0.0), ..Errors::default() };
+        let mut errors = Errors { flips: heading_jumps(track, |_| 0.0), ..Errors::default() };
         track.iter().for_each(|m| errors.add(m, &still));
         errors
     }
@@ -106,7 +106,7 @@ impl Errors {
         let alignment = Alignment::fit(track, truth);
         let backwards = alignment.heading.abs() > FRAC_PI_2;
         let heading = |t: f64| moment_at(truth, t).heading;
-        let flips = leaps(track, heading) + usize::from(backwards);
+        let flips = heading_jumps(track, heading) + usize::from(backwards);
         let mut errors = Errors { flips, ..Errors::default() };
         for moment in track {
             errors.add(&alignment.apply(moment), &moment_at(truth, moment.time_s));
@@ -150,7 +150,7 @@ impl Errors {
 }
 
 /// How often a heading jumps by more than a right angle relative to the true one.
-fn leaps(track: &[Moment], truth: impl Fn(f64) -> f64) -> usize {
+fn heading_jumps(track: &[Moment], truth: impl Fn(f64) -> f64) -> usize {
     let off = |m: &Moment| m.heading - truth(m.time_s);
     track.windows(2).filter(|m| turn(off(&m[0]), off(&m[1])).abs() > FRAC_PI_2).count()
 }
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_is_compared_with_its_mean() {
+    fn stationary_objects_are_compared_with_their_mean() {
         let moment = |n: usize| {
             let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
             Moment {
@@ -250,7 +250,7 @@ mod tests {
             }
         };
         let track: Vec<Moment> = (0..40).map(moment).collect();
-        let errors = Errors::standing(&track);
+        let errors = Errors::stationary(&track);
         let r = errors.rmse();
         let expected = [(r.position, 0.5), (r.ground, 0.3), (r.height, 0.4), (r.velocity, 1.0)];
         for (found, expected) in expected.into_iter().chain([(r.heading, 0.1), (r.turn_rate, 0.2)])

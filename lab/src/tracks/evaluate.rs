@@ -184,7 +184,7 @@ fn score(
 ) -> Score {
     let Run { track, costs, stop, seconds } = track(object, history, method, estimator);
     let errors = match object.stationary {
-        true => Errors::standing(&track.moments),
+        true => Errors::stationary(&track.moments),
         false => Errors::moving(&track.moments, &object.truth),
     };
     let (entropy, extent) = (entropy(&track.cloud), extent(&track.cloud));

@@ -109,14 +109,14 @@ pub fn cloud(id: &str, object: &Object, estimator: &mut Estimator) -> Result<Pic
     let mut panels = Vec::new();
     for (name, track) in tracks {
         let alignment = Alignment::fit(&track.moments, &object.truth);
-        let bring = |&n: &usize| {
+        let to_true_frame = |&n: &usize| {
             let at = DVec3::from_array(track.cloud[n].map(f64::from));
-            alignment.bring(at).as_vec3().to_array()
+            alignment.to_true_frame(at).as_vec3().to_array()
         };
         let time = |&n: &usize| (f64::from(object.returns[n].time_s) / span_s) as f32;
         panels.push(Cloud {
             title: name.into(),
-            points: order.iter().map(bring).collect(),
+            points: order.iter().map(to_true_frame).collect(),
             times: order.iter().map(time).collect(),
         });
     }

@@ -80,8 +80,9 @@ impl Found {
             }
         }
         let seen = objects.iter().zip(longest).filter_map(|(o, t)| Some((o, t?)));
-        let (objects, histories): (Vec<Object>, Vec<_>) =
-            seen.map(|(object, track)| (seen_as(object, track), track.history().to_vec())).unzip();
+        let (objects, histories): (Vec<Object>, Vec<_>) = seen
+            .map(|(object, track)| (as_tracked(object, track), track.history().to_vec()))
+            .unzip();
         self.outcomes.extend(evaluate(&objects, &histories, jobs));
         Ok(())
     }
@@ -162,7 +163,7 @@ fn swaps(owners: &[(f64, Option<usize>)]) -> usize {
 }
 
 /// An object as seen by a track: with the track's returns, batches and times.
-fn seen_as(object: &Object, track: &Track) -> Object {
+fn as_tracked(object: &Object, track: &Track) -> Object {
     let anchor = DVec3::from_array(track.anchor);
     let mut returns = track.returns().to_vec();
     returns.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
@@ -214,7 +215,7 @@ mod tests {
 
     /// Boxes of two objects, and places inside and outside them over time.
     #[test]
-    fn a_track_lies_on_the_object_whose_box_holds_it() {
+    fn tracks_belong_to_the_object_whose_box_contains_them() {
         let object = |x: f64, speed: f64| {
             let moment = |n: usize| Moment {
                 time_s: 0.1 * n as f64,

@@ -83,17 +83,17 @@ pub fn read(bytes: &[u8], key: u64) -> Option<Sets> {
     if u64::from_le_bytes(*check) != Digest::of(content) {
         return None;
     }
-    let mut left = Left(content);
+    let mut left = Unread(content);
     if left.word()? != key {
         return None;
     }
-    Some(Sets { stationary: left.all(Left::object)?, moving: left.all(Left::object)? })
+    Some(Sets { stationary: left.all(Unread::object)?, moving: left.all(Unread::object)? })
 }
 
 /// The bytes not yet read.
-struct Left<'a>(&'a [u8]);
+struct Unread<'a>(&'a [u8]);
 
-impl Left<'_> {
+impl Unread<'_> {
     fn chunk<const N: usize>(&mut self) -> Option<[u8; N]> {
         let (chunk, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
@@ -127,11 +127,11 @@ impl Left<'_> {
         let kind = *Kind::ALL.get(self.count()?)?;
         let stationary = self.count()? == 1;
         let [length, width, height, x, y, z, start_s] = self.doubles()?;
-        let returns = self.all(Left::one_return)?;
-        let ends = self.all(Left::count)?;
+        let returns = self.all(Unread::one_return)?;
+        let ends = self.all(Unread::count)?;
         let starts = [0].into_iter().chain(ends.iter().copied());
         let batches = starts.zip(ends.iter().copied()).map(|(a, b)| a..b).collect();
-        let truth = self.all(Left::moment)?;
+        let truth = self.all(Unread::moment)?;
         Some(Object {
             name,
             kind,

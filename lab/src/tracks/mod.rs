@@ -90,7 +90,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     let mut labels = Errors::default();
     let mut real = [Vec::new(), Vec::new()];
     for drive in drives {
-        drive.labels.iter().for_each(|track| labels.merge(&Errors::standing(track)));
+        drive.labels.iter().for_each(|track| labels.merge(&Errors::stationary(track)));
         real[0].extend(drive.stationary);
         real[1].extend(drive.moving);
     }

@@ -1,6 +1,6 @@
 //! Objects of simulated drives past parked and moving traffic, seen by four HDL-32E.
 
-use super::object::{Moment, Object, Seen, look_beside};
+use super::object::{Moment, Object, Seen, mark_passing_rays};
 use crate::labels::{Kind, kind, turn};
 use crate::simulate::truth::class_name;
 use glam::DVec3;
@@ -66,7 +66,7 @@ impl Wanted {
         }
     }
 
-    fn is_met(&self) -> bool {
+    fn is_satisfied(&self) -> bool {
         self.parked == 0 && self.moving.iter().all(|m| m.1 == 0)
     }
 
@@ -87,7 +87,7 @@ impl Wanted {
     /// Whether a drive may have an object that is wanted.
     fn may_have(&self, drive: &Drive) -> bool {
         let lacks = |kind| self.moving.iter().any(|m| m.0 == kind && m.1 > 0);
-        let moves = |o: &raywake_sim::Object| !o.path.is_still() && lacks(of_class(o.class));
+        let moves = |o: &raywake_sim::Object| !o.path.is_static() && lacks(of_class(o.class));
         self.parked > 0 || drive.scene().objects.iter().any(moves)
     }
 }
@@ -123,7 +123,7 @@ pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
     let mut wanted = wanted.clone();
     let mut sets = Sets { stationary: Vec::new(), moving: Vec::new() };
     for number in 0..DRIVES_MAX {
-        if wanted.is_met() {
+        if wanted.is_satisfied() {
             break;
         }
         let drive = drive(seed, number);
@@ -169,7 +169,7 @@ fn objects(drive: &Drive, number: u64) -> Vec<Object> {
     let mut found = Vec::new();
     for (id, returns) in seen {
         let object = &drive.scene().objects[id as usize - 1];
-        let stationary = object.path.is_still();
+        let stationary = object.path.is_static();
         let kind = of_class(object.class);
         if stationary && !matches!(kind, Kind::Car | Kind::Van | Kind::Truck) {
             continue;
@@ -231,7 +231,7 @@ fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>)
         let from = pose.transform(rig.sensors[point.sensor as usize].translation);
         all.push(Seen { at, from, time_s, sensor: point.sensor as u8, passed: [false; 2] });
     }
-    look_beside(&mut all, |n| sweep.truth[n].object != 0);
+    mark_passing_rays(&mut all, |n| sweep.truth[n].object != 0);
     for (one, truth) in all.into_iter().zip(&sweep.truth) {
         if truth.object != 0 {
             seen.entry(truth.object).or_default().push(one);
@@ -290,7 +290,7 @@ mod tests {
     use raywake_sim::stamp_s;
 
     #[test]
-    fn windows_lie_about_the_fullest_batch() {
+    fn windows_are_centred_on_the_fullest_batch() {
         let seen = |batches: &[(usize, usize)]| -> Vec<Seen> {
             let of = |&(b, n): &(usize, usize)| {
                 let (at, from, time_s) = (DVec3::ZERO, DVec3::ZERO, stamp_s(b));

@@ -21,7 +21,7 @@ fn small() -> &'static Sets {
 }
 
 #[test]
-fn sets_have_what_is_asked_for_and_are_the_same_again() {
+fn sets_are_as_requested_and_reproducible() {
     let sets = small();
     assert_eq!((sets.stationary.len(), sets.moving.len()), (5, 4));
     let mut kinds: Vec<Kind> = sets.moving.iter().map(|o| o.kind).collect();

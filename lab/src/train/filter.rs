@@ -7,7 +7,7 @@ use super::inputs::{Inputs, Visit};
 use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file::{quantise, text};
-use crate::curve::{Curve, Operating};
+use crate::curve::{Curve, OperatingPoint};
 use crate::labels::Kind;
 use raywake_core::params::Frame;
 use raywake_core::stages::background_filter::{PATCH, TABLE_WORDS, load};
@@ -93,10 +93,10 @@ struct Report {
     progress: Vec<Vec<Progress>>,
     auc: f64,
     /// At the dissertation's recall.
-    at_95: Operating,
+    at_95: OperatingPoint,
     /// With the weights as written, rounding included.
-    written: Operating,
-    curve: Vec<Operating>,
+    written: OperatingPoint,
+    curve: Vec<OperatingPoint>,
     largest_weight: f64,
 }
 
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_share_that_is_none_is_refused() {
+    fn an_invalid_share_is_refused() {
         let outputs = Outputs { out: "nowhere".into(), report: None };
         let args =
             Args { inputs: Inputs::default(), outputs, keep: Some(f64::NAN), as_printed: false };

@@ -65,14 +65,14 @@ mod tests {
         let of = |car: bool, wall: bool| {
             let mut scene = Scene::empty();
             if car {
-                scene.add_car(Path::standing(10.0, 0.0, 0.3), 1);
+                scene.add_car(Path::stationary(10.0, 0.0, 0.3), 1);
             }
             if wall {
                 let pose = raywake_core::pose::Pose::planar(0.0, 9.0, 1.5, 0.0);
                 scene.put(Class::Building, Shape::cuboid(20.0, 0.5, 3.0), pose, Surface::matt(0.5));
             }
             let options = Options { sweeps: 1, rig: SensorRig::ideal(), ..Options::default() };
-            let path = Path::standing(0.0, 0.0, 0.0);
+            let path = Path::stationary(0.0, 0.0, 0.0);
             let mut drive = Simulated::new(Drive::through(scene, path, 1, options));
             let mut sampling = Sampling {
                 grid: &mut Grid::new(Profile::hdl64()),

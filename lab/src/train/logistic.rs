@@ -37,7 +37,7 @@ struct Slope {
 /// Maximum number of Newton steps; about ten are needed.
 const STEPS_MAX: usize = 40;
 /// Decrease of the loss below which the fit has converged.
-const ENOUGH: f64 = 1e-9;
+const LOSS_TOLERANCE: f64 = 1e-9;
 
 impl Data {
     /// Weights of rows, in proportion to `weights` within a class, such that both classes count the
@@ -61,9 +61,9 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
         self.slope(weights, false).loss
     }
 
-    /// The weights that minimise the loss, bias last. `told` is called with weights and loss after
-    /// every step.
-    pub fn fit(&self, told: &mut dyn FnMut(&[f64], f64)) -> Vec<f64> {
+    /// The weights that minimise the loss, bias last. `report` is called with weights and loss
+    /// after every step.
+    pub fn fit(&self, report: &mut dyn FnMut(&[f64], f64)) -> Vec<f64> {
         let mut weights = vec![0.0; self.width + 1];
         let mut here = self.slope(&weights, true);
         for _ in 0..STEPS_MAX {
@@ -82,8 +82,8 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
             };
             weights = moved;
             here = self.slope(&weights, true);
-            told(&weights, here.loss);
-            if before - here.loss < ENOUGH {
+            report(&weights, here.loss);
+            if before - here.loss < LOSS_TOLERANCE {
                 break;
             }
         }
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_toy_has_the_known_optimum() {
+    fn toy_problem_has_the_known_optimum() {
         // Three of four rows with the count are foreground, and one of four without.
         let data = Data {
             width: 1,

@@ -2,7 +2,7 @@
 
 use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
-use crate::curve::{Curve, Operating};
+use crate::curve::{Curve, OperatingPoint};
 use crate::eval::{Row, rows_of};
 use raywake_core::refinement::cues::Cues;
 use raywake_io::Error;
@@ -36,7 +36,7 @@ struct Report {
     brier: f64,
     /// By tenths of P(moves), held-out columns: its mean, how many moved, and out of how many.
     reliability: Vec<(f64, u64, u64)>,
-    curve: Vec<Operating>,
+    curve: Vec<OperatingPoint>,
 }
 
 /// Fits, writes a configuration file and reports.
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_moves_and_what_stands_count() {
+    fn moving_and_static_objects_count() {
         let row = Row { in_view: true, basis: 2, motion: 2, ..Row::default() };
         assert!(counts(&row) && counts(&Row { motion: 0, ..row }));
         assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { basis: 1, ..row }));

@@ -148,14 +148,14 @@ mod tests {
         let mut scene = Scene::empty();
         let way = |x, y, yaw, speed| Path::from(State { x, y, yaw, speed });
         scene.add_car(way(12.0, 0.0, std::f64::consts::FRAC_PI_2, 9.0), 1);
-        scene.add_car(Path::standing(5.0, -8.0, 0.3), 2);
+        scene.add_car(Path::stationary(5.0, -8.0, 0.3), 2);
         scene.add_car(way(-10.0, 6.0, 0.0, 55.0), 3);
         let options = Options { sweeps: 3, rig: SensorRig::ideal(), ..Options::default() };
         Simulated::new(Drive::through(scene, way(0.0, 0.0, 0.0, speed), 1, options))
     }
 
     #[test]
-    fn in_the_vehicles_frame_what_stands_comes_nearer() {
+    fn static_structure_approaches_in_the_vehicle_frame() {
         let mut grid = Grid::new(Profile::dissertation());
         // 0.9 m a sweep are three cells.
         let mut drive = scene(9.0);

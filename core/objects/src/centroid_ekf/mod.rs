@@ -278,10 +278,10 @@ impl CentroidEkf {
 /// The unicycle of (2.6) after `dt` seconds: along the chord of its arc, whose length is taken to
 /// be that of the arc.
 fn advance(m: &StateVector, dt: f64) -> StateVector {
-    let way = m[3] + 0.5 * dt * m[6];
+    let course = m[3] + 0.5 * dt * m[6];
     let mut next = *m;
-    next[0] += m[4] * libm::cos(way) * dt;
-    next[1] += m[4] * libm::sin(way) * dt;
+    next[0] += m[4] * libm::cos(course) * dt;
+    next[1] += m[4] * libm::sin(course) * dt;
     next[2] += m[5] * dt;
     next[3] += m[6] * dt;
     next
@@ -289,8 +289,8 @@ fn advance(m: &StateVector, dt: f64) -> StateVector {
 
 /// Derivative of [`advance`] with respect to the state.
 fn jacobian(m: &StateVector, dt: f64) -> Covariance {
-    let way = m[3] + 0.5 * dt * m[6];
-    let (along_x, along_y) = (libm::cos(way) * dt, libm::sin(way) * dt);
+    let course = m[3] + 0.5 * dt * m[6];
+    let (along_x, along_y) = (libm::cos(course) * dt, libm::sin(course) * dt);
     let mut f = Covariance::identity();
     (f[(0, 3)], f[(0, 4)], f[(0, 6)]) = (-m[4] * along_y, along_x, -0.5 * dt * m[4] * along_y);
     (f[(1, 3)], f[(1, 4)], f[(1, 6)]) = (m[4] * along_x, along_y, 0.5 * dt * m[4] * along_x);

@@ -41,7 +41,7 @@ fn follow(truth: impl Fn(f64) -> [f64; 3], seed: u64, noise: f64) -> Vec<ObjectS
 
 /// As from two sensors that see two sides of an object in immediate succession.
 #[test]
-fn centroids_at_one_time_are_no_motion() {
+fn centroids_at_one_time_give_no_motion() {
     for after_s in [0.0, 1e-300, 1e-30, 1e-12, 1e-6] {
         let mut ekf = CentroidEkf::birth(&PARAMS, 0.0, [0.0; 3]);
         for n in 1..4 {
@@ -94,7 +94,7 @@ fn a_circle_unwraps_the_heading() {
 }
 
 #[test]
-fn what_stands_stays() {
+fn static_structure_stays() {
     // Exactly, without ever having a heading.
     let states = follow(|_| [4.0, 5.0, 6.0], 1, 0.0);
     assert!(states.iter().all(|s| s.position == [4.0, 5.0, 6.0] && s.speed == 0.0));
@@ -107,7 +107,7 @@ fn what_stands_stays() {
 }
 
 #[test]
-fn backwards_is_turned_once_and_reversing_stays() {
+fn backwards_headings_flip_once_unless_reversing() {
     let mut random = Random(4);
     // It reverses after three seconds.
     let truth = |t: f64| [if t < 3.0 { 4.0 * t } else { 24.0 - 4.0 * t }, 0.0, 0.0];

@@ -139,7 +139,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn solves_what_elimination_solves() {
+    fn agrees_with_elimination() {
         let mut random = Random(9);
         let mut system = CholeskySystem::<23, 529>::new();
         for n in [1, 2, 7, 23] {
@@ -170,7 +170,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn hardly_goes_where_nothing_determines() {
+    fn barely_moves_along_undetermined_directions() {
         let mut system = CholeskySystem::<2, 4>::new();
         system.clear(2);
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {

@@ -16,9 +16,9 @@ struct CarvingRay {
 impl CarvingRay {
     /// None if it is too short to carve.
     fn new(from: [f64; 3], to: [f64; 3], clearance_m: f64) -> Option<CarvingRay> {
-        let way: [f64; 3] = core::array::from_fn(|d| to[d] - from[d]);
-        let length = libm::sqrt(way.iter().map(|v| v * v).sum());
-        let direction = way.map(|v| v / length);
+        let vector: [f64; 3] = core::array::from_fn(|d| to[d] - from[d]);
+        let length = libm::sqrt(vector.iter().map(|v| v * v).sum());
+        let direction = vector.map(|v| v / length);
         (length >= clearance_m).then_some(CarvingRay {
             from,
             direction,

@@ -16,7 +16,7 @@ impl Problem {
     /// then at rest at the mean of the returns.
     pub fn start(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
         if !self.fit(history) {
-            self.stand_at_mean();
+            self.rest_at_mean();
             return false;
         }
         if params.multi_start {
@@ -72,7 +72,7 @@ impl Problem {
     }
 
     /// Sets everything at rest at the mean of the history. False if there is none.
-    pub fn stand(&mut self, history: &[ObjectState]) -> bool {
+    pub fn rest_at_history_mean(&mut self, history: &[ObjectState]) -> bool {
         let mut sum = [0.0; 4];
         let mut count = 0.0;
         for state in unwrapped(history) {
@@ -90,7 +90,7 @@ impl Problem {
     }
 
     /// Sets everything at rest at the mean of the returns.
-    pub fn stand_at_mean(&mut self) {
+    pub fn rest_at_mean(&mut self) {
         let mut mean = [0.0; 7];
         for sample in self.samples.all() {
             for (sum, value) in mean.iter_mut().zip(sample.position) {

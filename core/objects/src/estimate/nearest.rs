@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn is_that_of_brute_force() {
+    fn equals_that_of_brute_force() {
         let mut random = Random(1);
         let mut grid = raywake_alloc_guard::boxed!(NearestGrid<300>, NearestGrid::new());
         for (count, size) in [(1, 1.0), (2, 0.0), (40, 3.0), (300, 5.0), (300, 0.01), (300, 900.0)]

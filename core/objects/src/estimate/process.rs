@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_costs_the_logarithm_of_its_noise() {
+    fn turn_cost_is_the_log_of_its_noise() {
         let process = ProcessModel::of(&EstimateParams {
             student_dof: 1.0,
             manoeuvre_s: 1.0,

@@ -80,7 +80,7 @@ fn quota(counts: &[u32; PARTS], at_most: usize) -> u32 {
 }
 
 /// Whether a return is finite and within the range of a track.
-pub(super) fn is_sound_return(one: &ObjectReturn) -> bool {
+pub(super) fn is_valid_return(one: &ObjectReturn) -> bool {
     let places = one.position.iter().chain(&one.origin);
     one.time_s.abs() <= FAR && places.map(|value| value.abs()).all(|value| value <= FAR)
 }
@@ -101,7 +101,7 @@ impl Samples {
     ) -> Option<Taken> {
         self.count = 0;
         let at_most = at_most.clamp(1, RETURNS_MAX);
-        let sound = || returns.iter().filter(|one| is_sound_return(one));
+        let sound = || returns.iter().filter(|one| is_valid_return(one));
         let times = || sound().map(|one| one.time_s);
         let (first_s, last_s) = (times().reduce(f32::min)?, times().reduce(f32::max)?);
         let per_s = TICKS as f32 / (last_s - first_s).max(SPAN_MIN_S);
@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_glance_tells_how_long_an_object_is() {
+    fn object_length_is_measured_at_a_glance() {
         let mut returns = raywake_alloc_guard::boxed!(Samples, Samples::new());
         // 8 m along the diagonal of the plane at 5 m/s; half of it hidden for half a second.
         let mut look = |count: usize| {

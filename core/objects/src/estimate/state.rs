@@ -43,14 +43,14 @@ pub(super) fn elements(state: &ObjectState) -> ControlPoint {
 }
 
 /// Whether all elements are finite and within the range of a track.
-pub(super) fn is_sound(state: &ObjectState) -> bool {
+pub(super) fn is_valid(state: &ObjectState) -> bool {
     elements(state).iter().chain(&[state.time_s]).all(|value| value.abs() <= ELEMENT_MAX)
 }
 
 /// The sound states of a history, their heading unwrapped.
 pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectState> {
     let mut last: Option<f64> = None;
-    history.iter().filter(|state| is_sound(state)).map(move |state| {
+    history.iter().filter(|state| is_valid(state)).map(move |state| {
         let heading = match last {
             Some(last) => last + wrap_angle(state.heading - last),
             None => wrap_angle(state.heading),

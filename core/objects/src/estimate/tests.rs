@@ -1,6 +1,6 @@
 extern crate std;
 
-use super::state::is_sound;
+use super::state::is_valid;
 use super::synthetic::{self, Drive, Errors, Plan, drive, errors, history_errors};
 use super::*;
 use crate::RETURNS_MAX;
@@ -63,7 +63,7 @@ fn finds_the_optimum_of_a_point_in_uniform_motion() {
 }
 
 #[test]
-fn goes_on_as_at_the_end() {
+fn continues_as_at_the_end() {
     let (returns, history) = point();
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     estimator.solve(&EstimateParams::DISSERTATION, &returns, &history);
@@ -73,7 +73,7 @@ fn goes_on_as_at_the_end() {
 }
 
 #[test]
-fn parked_cars_stand() {
+fn parked_cars_are_static() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let drives: Vec<Drive> = (0..4).map(|seed| drive(synthetic::parked(seed))).collect();
     let all: Vec<_> =
@@ -187,7 +187,7 @@ fn conditioning_leaves_the_step_exact() {
 }
 
 #[test]
-fn is_the_same_again() {
+fn is_reproducible() {
     let drive = drive(Plan { seconds: 2.0, ..synthetic::moving(2) });
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let mut bits = || {
@@ -200,7 +200,7 @@ fn is_the_same_again() {
 
 fn sane(estimator: &Estimator) {
     for time_s in [-10.0, 0.0, 0.3, 5.0, 100.0] {
-        assert!(is_sound(&estimator.state(time_s)), "{:?}", estimator.state(time_s));
+        assert!(is_valid(&estimator.state(time_s)), "{:?}", estimator.state(time_s));
     }
     assert!(estimator.model().as_flattened().iter().all(|value| value.is_finite()));
 }
@@ -266,7 +266,7 @@ fn bad_input_is_bounded_and_reported() {
 }
 
 #[test]
-fn takes_as_many_as_it_may_evenly_in_time() {
+fn takes_the_maximum_number_evenly_in_time() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     // A tenth of the returns in nine tenths of the time, unordered.
     let mut random = Random(5);
@@ -299,7 +299,7 @@ fn takes_as_many_as_it_may_evenly_in_time() {
 
 /// The count is that of the start that led to the estimate, not of all starts tried.
 #[test]
-fn carved_points_are_those_that_lack() {
+fn carved_points_are_the_missing_ones() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let params = EstimateParams::DEFAULT;
     let mut carved = 0;
@@ -318,7 +318,7 @@ fn carved_points_are_those_that_lack() {
 
 /// A crumb has no heading that returns could show, but it does not spin either.
 #[test]
-fn whole_turns_are_taken_back() {
+fn whole_revolutions_are_undone() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let mut random = Random(2);
     for _ in 0..20 {
@@ -363,7 +363,7 @@ fn a_wrong_association_does_not_break_a_track() {
 }
 
 #[test]
-fn what_is_long_is_sluggish() {
+fn long_objects_are_sluggish() {
     let ours = EstimateParams::DEFAULT;
     let by = |length_m: f32| {
         let of = ours.for_length(length_m);

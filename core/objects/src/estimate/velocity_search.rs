@@ -143,10 +143,10 @@ impl VelocitySearch {
                 let by = [i, j].map(|n| f64::from(n as f32 * step));
                 let velocity = [centre[0] + by[0], centre[1] + by[1]];
                 let edges_full = params.search_edges;
-                let fullness =
-                    self.fullness(count, velocity.map(|v| v as f32), 1.0 / cell_m, edges_full);
-                if fullness > best.0 {
-                    best = (fullness, velocity);
+                let concentration =
+                    self.concentration(count, velocity.map(|v| v as f32), 1.0 / cell_m, edges_full);
+                if concentration > best.0 {
+                    best = (concentration, velocity);
                 }
             }
         }
@@ -154,7 +154,7 @@ impl VelocitySearch {
     }
 
     /// Sum of `n ln n` over the cells at a velocity, per return.
-    fn fullness(
+    fn concentration(
         &mut self,
         count: Counts,
         [vx, vy]: [f32; 2],
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_velocity_is_found_where_the_centroid_errs() {
+    fn velocity_is_found_where_the_centroid_is_wrong() {
         let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         for (length_m, velocity) in [(4.5, [7.0, 2.0]), (12.0, [-6.0, 3.0]), (4.5, [0.3, 0.0])] {
             let samples = passing(length_m, velocity);
@@ -271,7 +271,7 @@ mod tests {
     /// A smooth side behind a gap: its front is visible until it leaves the gap, its rear once it
     /// has entered it.
     #[test]
-    fn where_it_ends_tells_how_a_side_moves() {
+    fn ends_determine_how_a_side_moves() {
         let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         let mut random = Random(9);
         let [gap, length_m, speed] = [20.0, 22.0, 6.0];
@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wild_takes_no_longer() {
+    fn implausible_input_takes_no_longer() {
         let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         let mut random = Random(5);
         let mut wild: Vec<Sample> = (0..3000)

@@ -4,7 +4,7 @@
 use super::assignment::Assignment;
 use super::batch::Batch;
 use super::segments::Segment;
-use super::{FrontEndParams, Life, SEGMENTS_MAX, TRACKS_MAX, Track};
+use super::{FrontEndParams, SEGMENTS_MAX, TRACKS_MAX, Track, TrackStatus};
 use crate::centroid_ekf::CentroidEkf;
 use nalgebra::{Matrix2, Vector2};
 use raywake_core::record::NONE;
@@ -38,7 +38,7 @@ impl Association {
     ) {
         self.live.clear();
         for (slot, track) in tracks.iter().enumerate() {
-            let Some(ekf) = track.ekf.as_ref().filter(|_| track.life == Life::Live) else {
+            let Some(ekf) = track.ekf.as_ref().filter(|_| track.status == TrackStatus::Live) else {
                 continue;
             };
             let costs = self.assignment.costs(self.live.len());

@@ -35,7 +35,7 @@ pub use counts::TrackingCounts;
 pub use object_returns::GroundMap;
 pub use params::FrontEndParams;
 pub use thinned::Thinned;
-pub use track::{HISTORY_MAX, LATEST_MAX, Life, StateVariances, Track};
+pub use track::{HISTORY_MAX, LATEST_MAX, StateVariances, Track, TrackStatus};
 
 use crate::panorama::Panorama;
 use association::Association;
@@ -186,7 +186,7 @@ impl FrontEnd {
         }
         for slot in self.association.unobserved() {
             if tracks[slot].observations < params.observations_min {
-                tracks[slot].life = Life::Ended;
+                tracks[slot].status = TrackStatus::Ended;
                 counts.ended += 1;
             } else {
                 counts.waiting += 1;
@@ -205,7 +205,7 @@ impl FrontEnd {
         let count = |n: u32| segments[n as usize].count;
         self.unassigned.sort_unstable_by_key(|n| (u32::MAX - count(*n), *n));
         for &n in &self.unassigned {
-            let Some(slot) = tracks.iter().position(|t| t.life == Life::Free) else {
+            let Some(slot) = tracks.iter().position(|t| t.status == TrackStatus::Free) else {
                 counts.unborn += 1;
                 continue;
             };
@@ -233,7 +233,7 @@ impl FrontEnd {
 
 /// Frees the slots of tracks that have ended.
 fn free_ended<const R: usize, const H: usize>(tracks: &mut [Track<R, H>]) {
-    tracks.iter_mut().filter(|t| t.life == Life::Ended).for_each(Track::free);
+    tracks.iter_mut().filter(|t| t.status == TrackStatus::Ended).for_each(Track::free);
 }
 
 /// Ends live tracks. Returns how many.
@@ -242,8 +242,8 @@ fn end<const R: usize, const H: usize>(
     which: impl Fn(&Track<R, H>) -> bool,
 ) -> u64 {
     let mut ended = 0;
-    for track in tracks.iter_mut().filter(|t| t.life == Life::Live && which(t)) {
-        track.life = Life::Ended;
+    for track in tracks.iter_mut().filter(|t| t.status == TrackStatus::Live && which(t)) {
+        track.status = TrackStatus::Ended;
         ended += 1;
     }
     ended

@@ -25,15 +25,15 @@ pub const OFFSETS: Timing = Timing::Offset { from_s: 0.0, span_s: 0.1 };
 
 /// A box on the ground, seen all around.
 #[derive(Clone, Copy)]
-pub struct Thing {
+pub struct SceneBox {
     pub at: [f64; 2],
     pub size: [f64; 3],
     pub velocity: [f64; 2],
 }
 
-impl Thing {
-    pub fn car(x: f64, y: f64, velocity: [f64; 2]) -> Thing {
-        Thing { at: [x, y], size: [4.0, 1.8, 1.5], velocity }
+impl SceneBox {
+    pub fn car(x: f64, y: f64, velocity: [f64; 2]) -> SceneBox {
+        SceneBox { at: [x, y], size: [4.0, 1.8, 1.5], velocity }
     }
 
     /// Points of its sides `time_s` after the start.
@@ -63,7 +63,7 @@ pub fn ground() -> Vec<[f64; 3]> {
 }
 
 /// What a sensor sees `offset_s` after the stamp.
-pub fn seen(things: &[Thing], stamp_s: f64, offset_s: f32, sensor: u32) -> Vec<Point> {
+pub fn seen(things: &[SceneBox], stamp_s: f64, offset_s: f32, sensor: u32) -> Vec<Point> {
     let places = things.iter().flat_map(|t| t.points(stamp_s + offset_s as f64));
     let point =
         |p: [f64; 3]| Point { position: p.map(|v| v as f32), intensity: 0.0, offset_s, sensor };
@@ -96,12 +96,12 @@ impl Run {
         self.front_end.step(&PARAMS, None, &mut self.tracks)
     }
 
-    pub fn see(&mut self, things: &[Thing], stamp_s: f64) -> TrackingCounts {
+    pub fn see(&mut self, things: &[SceneBox], stamp_s: f64) -> TrackingCounts {
         self.take(stamp_s, &seen(things, stamp_s, 0.0, 0), None);
         self.step()
     }
 
     pub fn live(&self) -> Vec<&Track> {
-        self.tracks.iter().filter(|t| t.life == Life::Live).collect()
+        self.tracks.iter().filter(|t| t.status == TrackStatus::Live).collect()
     }
 }

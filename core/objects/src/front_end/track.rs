@@ -18,7 +18,7 @@ pub const LATEST_MAX: usize = 256;
 
 /// Stage in the life of a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Life {
+pub enum TrackStatus {
     /// A free slot.
     #[default]
     Free,
@@ -35,7 +35,7 @@ pub struct Track<const RETURNS: usize = RETURNS_MAX, const HISTORY: usize = HIST
     /// Number among all tracks, from 0 in order of birth.
     pub id: u32,
     /// Stage in its life.
-    pub life: Life,
+    pub status: TrackStatus,
     /// Point in the world that its positions are relative to, m: its first centroid.
     pub anchor: [f64; 3],
     /// Time of its first centroid, s.
@@ -46,7 +46,7 @@ pub struct Track<const RETURNS: usize = RETURNS_MAX, const HISTORY: usize = HIST
     history: Thinned<ObjectState, HISTORY>,
     returns: Thinned<ObjectReturn, RETURNS>,
     latest: Thinned<ObjectReturn, LATEST_MAX>,
-    told: Told,
+    evidence: ReturnEvidence,
     /// Mean P(moves) of its returns at every state of the history.
     p_moves: Thinned<f32, HISTORY>,
     variances: Thinned<StateVariances, HISTORY>,
@@ -79,7 +79,7 @@ impl StateVariances {
 
 /// What flow and encoder say about its returns.
 #[derive(Clone, Copy, Debug, Default)]
-struct Told {
+struct ReturnEvidence {
     /// For the last observation: the sum of P(moves), and the number of returns in it.
     p_moves: (f32, u32),
     /// Number of returns of each class, in the order of [`ColumnClass::ALL`], in all observations.
@@ -88,8 +88,9 @@ struct Told {
     moving: u32,
 }
 
-impl Told {
-    const NONE: Told = Told { p_moves: (0.0, 0), classes: [0; ColumnClass::ALL.len()], moving: 0 };
+impl ReturnEvidence {
+    const NONE: ReturnEvidence =
+        ReturnEvidence { p_moves: (0.0, 0), classes: [0; ColumnClass::ALL.len()], moving: 0 };
 }
 
 impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
@@ -97,7 +98,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     pub const fn new() -> Self {
         Track {
             id: 0,
-            life: Life::Free,
+            status: TrackStatus::Free,
             anchor: [0.0; 3],
             start_s: 0.0,
             observations: 0,
@@ -105,7 +106,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
             history: Thinned::new(),
             returns: Thinned::new(),
             latest: Thinned::new(),
-            told: Told::NONE,
+            evidence: ReturnEvidence::NONE,
             p_moves: Thinned::new(),
             variances: Thinned::new(),
         }
@@ -159,13 +160,13 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
 
     /// Mean P(moves) at its last observation; none if the flow gives none.
     pub fn p_moves_now(&self) -> Option<f32> {
-        let (sum, returns) = self.told.p_moves;
+        let (sum, returns) = self.evidence.p_moves;
         (returns > 0).then(|| sum / returns as f32)
     }
 
     /// The class that the encoder assigns to most of its returns; none if it assigns none.
     pub fn class(&self) -> Option<ColumnClass> {
-        let count = |class: &ColumnClass| self.told.classes[*class as usize];
+        let count = |class: &ColumnClass| self.evidence.classes[*class as usize];
         // The first of equal ones.
         let most = ColumnClass::ALL.into_iter().rev().max_by_key(count)?;
         (count(&most) > 0).then_some(most)
@@ -173,19 +174,19 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
 
     /// Share of its classified returns that have that class, 0 to 1.
     pub fn class_share(&self) -> f32 {
-        let most = self.told.classes.into_iter().max().unwrap_or(0);
-        most as f32 / self.told.classes.iter().sum::<u32>().max(1) as f32
+        let most = self.evidence.classes.into_iter().max().unwrap_or(0);
+        most as f32 / self.evidence.classes.iter().sum::<u32>().max(1) as f32
     }
 
     /// Whether flow and encoder show that it is a road user: it was seen to move in as many
     /// observations as a track needs and got somewhere, or most of its classified returns are of
     /// classes that could move. Outside the flow's window nothing is.
     pub fn is_object(&self, params: &FrontEndParams) -> bool {
-        let told: u32 = self.told.classes.iter().sum();
-        let count = |class: ColumnClass| self.told.classes[class as usize];
+        let told: u32 = self.evidence.classes.iter().sum();
+        let count = |class: ColumnClass| self.evidence.classes[class as usize];
         let users = ColumnClass::ALL.into_iter().filter(|c| c.could_move()).map(count).sum::<u32>();
         let is_user = told > 0 && users as f32 >= params.road_user_share_min * told as f32;
-        let moved = self.told.moving >= params.observations_min;
+        let moved = self.evidence.moving >= params.observations_min;
         is_user || moved && self.moved_m() >= params.track_way_min_m
     }
 
@@ -200,13 +201,13 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     }
 
     pub(super) fn free(&mut self) {
-        self.life = Life::Free;
+        self.status = TrackStatus::Free;
         self.ekf = None;
         self.observations = 0;
         self.history.clear();
         self.returns.clear();
         self.latest.clear();
-        self.told = Told::NONE;
+        self.evidence = ReturnEvidence::NONE;
         self.p_moves.clear();
         self.variances.clear();
     }
@@ -214,7 +215,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     /// Begins a track at a point in the world.
     pub(super) fn begin(&mut self, id: u32, params: &CentroidParams, time_s: f64, at: [f64; 3]) {
         self.free();
-        (self.id, self.life) = (id, Life::Live);
+        (self.id, self.status) = (id, TrackStatus::Live);
         (self.anchor, self.start_s) = (at, time_s);
         let ekf = CentroidEkf::birth(params, 0.0, [0.0; 3]);
         self.history.push(ekf.state());
@@ -239,17 +240,17 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         revision.revise(&state, self.history.kept_mut());
         self.history.push(state);
         self.latest.clear();
-        self.told.p_moves = (0.0, 0);
+        self.evidence.p_moves = (0.0, 0);
         self.observations += 1;
     }
 
     /// Completes an observation, after all its returns.
     pub(super) fn complete(&mut self, params: &FrontEndParams) {
-        if self.life != Life::Live || self.p_moves.seen() >= self.history.seen() {
+        if self.status != TrackStatus::Live || self.p_moves.seen() >= self.history.seen() {
             return;
         }
         let mean = self.p_moves_now().unwrap_or(f32::NAN);
-        self.told.moving += u32::from(mean >= params.track_moves_min);
+        self.evidence.moving += u32::from(mean >= params.track_moves_min);
         self.p_moves.push(mean);
     }
 
@@ -266,10 +267,10 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         self.returns.push(kept);
         self.latest.push(kept);
         if let Some(p) = one.p_moves {
-            self.told.p_moves = (self.told.p_moves.0 + p, self.told.p_moves.1 + 1);
+            self.evidence.p_moves = (self.evidence.p_moves.0 + p, self.evidence.p_moves.1 + 1);
         }
         if let Some(class) = one.class {
-            self.told.classes[class as usize] += 1;
+            self.evidence.classes[class as usize] += 1;
         }
     }
 }

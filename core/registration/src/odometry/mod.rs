@@ -58,14 +58,14 @@ const SETTLED_M: f64 = 0.01;
 /// Maximum number of rounds to get there: what is left of 30 m/s then is below 1 cm.
 const ROUNDS_MAX: usize = 5;
 /// Assumed distance of returns moved by a rotation, m.
-const AWAY_M: f64 = 20.0;
+const LEVER_ARM_M: f64 = 20.0;
 /// Intervals between stamps this close to whole revolutions of the sensor come from a coarser
 /// clock, revolutions.
 const WHOLE: f64 = 0.2;
 
 /// How a sweep was located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Locating {
+pub enum PoseStatus {
     /// It is the first one.
     Start,
     /// By registration.
@@ -78,14 +78,14 @@ pub enum Locating {
     Lost,
 }
 
-impl Locating {
+impl PoseStatus {
     /// Returns the name, a single word.
     pub const fn name(self) -> &'static str {
         match self {
-            Locating::Start => "start",
-            Locating::Registered => "registered",
-            Locating::Degenerate => "degenerate",
-            Locating::Lost => "lost",
+            PoseStatus::Start => "start",
+            PoseStatus::Registered => "registered",
+            PoseStatus::Degenerate => "degenerate",
+            PoseStatus::Lost => "lost",
         }
     }
 }
@@ -98,7 +98,7 @@ pub struct Located {
     /// Velocity at the stamp.
     pub twist: Twist,
     /// How that is known.
-    pub locating: Locating,
+    pub pose_status: PoseStatus,
 }
 
 /// The map and the motion so far.
@@ -113,7 +113,7 @@ pub struct Odometry {
     pose: Pose,
     twist: Twist,
     /// Whether the twist is known from elsewhere.
-    told: bool,
+    twist_given: bool,
     /// Whether other motions fit as well as the one taken.
     unsure: bool,
 }
@@ -135,14 +135,14 @@ impl Odometry {
             stamp_s: 0.0,
             pose: Pose { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), translation: DVec3::ZERO },
             twist: Twist::ZERO,
-            told: false,
+            twist_given: false,
             unsure: false,
         }
     }
 
     /// Sets the motion to expect for the next sweep, along the axes of the vehicle there.
     pub fn expect(&mut self, twist: Twist) {
-        (self.twist, self.told) = (twist, true);
+        (self.twist, self.twist_given) = (twist, true);
     }
 
     /// Locates the next sweep.
@@ -151,10 +151,10 @@ impl Odometry {
         self.sweeps[self.count as usize % 2].fill(points, rig);
         let dt_s = duration_s(rig, stamp_s - self.stamp_s);
         self.stamp_s = stamp_s;
-        let locating = match self.count {
+        let pose_status = match self.count {
             1 => {
                 self.pose = Pose::IDENTITY;
-                Locating::Start
+                PoseStatus::Start
             }
             _ if self.points().len() < RETURNS_MIN => self.miss(dt_s),
             2 => self.start(dt_s),
@@ -162,7 +162,7 @@ impl Odometry {
         };
         let motion = self.twist;
         self.put(self.count, &motion);
-        Located { world_from_vehicle: self.pose, twist: self.twist, locating }
+        Located { world_from_vehicle: self.pose, twist: self.twist, pose_status }
     }
 
     /// Returns of the current sweep, one per voxel.
@@ -171,31 +171,31 @@ impl Odometry {
     }
 
     /// Continues with constant motion.
-    fn miss(&mut self, dt_s: f64) -> Locating {
+    fn miss(&mut self, dt_s: f64) -> PoseStatus {
         self.pose = self.pose * self.twist.over(dt_s);
-        Locating::Lost
+        PoseStatus::Lost
     }
 
     /// Registers the sweep with the map or, if that fails, with the previous sweep.
-    fn follow(&mut self, dt_s: f64) -> Locating {
+    fn follow(&mut self, dt_s: f64) -> PoseStatus {
         if self.unsure && self.count.is_multiple_of(TRIED_EVERY) {
             return self.start(dt_s);
         }
         let initial = self.pose * self.twist.over(dt_s);
         let found = self.register(initial, dt_s, &KERNELS_M[EXPECTED_FROM..]);
         if is_located(&found) {
-            return self.go(&found, dt_s);
+            return self.adopt(&found, dt_s);
         }
         self.start(dt_s)
     }
 
     /// Tries several motions for the sweep and the one before it.
-    fn start(&mut self, dt_s: f64) -> Locating {
+    fn start(&mut self, dt_s: f64) -> PoseStatus {
         let best = self.best_start(dt_s);
         let (found, before) = self.settle(best, dt_s);
         self.map_of_before(&before);
         if is_located(&found) {
-            return self.go(&found, dt_s);
+            return self.adopt(&found, dt_s);
         }
         self.map.clear();
         self.miss(dt_s)
@@ -204,7 +204,7 @@ impl Odometry {
     /// The best-fitting of several motions. If others fit as well, it is unsure, and if it already
     /// was before, the expected one is kept.
     fn best_start(&mut self, dt_s: f64) -> (Registration, Twist) {
-        let speeds_mps = if self.told { &[][..] } else { &SPEEDS_MPS };
+        let speeds_mps = if self.twist_given { &[][..] } else { &SPEEDS_MPS };
         let ahead = speeds_mps.iter().map(|x| Twist { linear: DVec3::X * *x, ..Twist::ZERO });
         let expected = self.pair(self.twist, dt_s);
         let mut all = heapless::Vec::<_, { SPEEDS_MPS.len() + 1 }>::from([expected]);
@@ -212,7 +212,7 @@ impl Odometry {
             // There is room for all of them.
             let _ = all.push(self.pair(motion, dt_s));
         }
-        let rank = |r: &Registration| (is_located(r), r.unobserved.planar == 0, r.inliers);
+        let rank = |r: &Registration| (is_located(r), r.unobservable.planar == 0, r.inliers);
         let better = |best: (Registration, Twist), other: (Registration, Twist)| {
             if rank(&other.0) > rank(&best.0) { other } else { best }
         };
@@ -258,7 +258,7 @@ impl Odometry {
         for _ in 0..ROUNDS_MAX {
             let now = (self.pose.inverse() * found.pose).twist(dt_s);
             let (linear, angular) = (now.linear - before.linear, now.angular - before.angular);
-            let changed_m = (linear.length() + AWAY_M * angular.length()) * dt_s.abs();
+            let changed_m = (linear.length() + LEVER_ARM_M * angular.length()) * dt_s.abs();
             if !is_located(&found) || changed_m < SETTLED_M {
                 break;
             }
@@ -281,11 +281,11 @@ impl Odometry {
     }
 
     /// Adopts the pose that was found.
-    fn go(&mut self, found: &Registration, dt_s: f64) -> Locating {
-        self.twist = at_now(&(self.pose.inverse() * found.pose), dt_s);
+    fn adopt(&mut self, found: &Registration, dt_s: f64) -> PoseStatus {
+        self.twist = constant_twist(&(self.pose.inverse() * found.pose), dt_s);
         self.pose = found.pose;
-        let tells = found.unobserved.planar == 0 && !self.unsure;
-        if tells { Locating::Registered } else { Locating::Degenerate }
+        let determined = found.unobservable.planar == 0 && !self.unsure;
+        if determined { PoseStatus::Registered } else { PoseStatus::Degenerate }
     }
 
     /// Finds the pose that aligns the sweep with the map, starting at `initial`.
@@ -297,7 +297,7 @@ impl Odometry {
             found.converged = false;
             let mut count = 0;
             for _ in 0..STEPS {
-                let twist = at_now(&(self.pose.inverse() * found.pose), dt_s);
+                let twist = constant_twist(&(self.pose.inverse() * found.pose), dt_s);
                 let all = points.iter().step_by(stride);
                 let (motion, into) = ((&found.pose, &twist), &mut self.correspondences);
                 count = matched(all, &mut self.map, motion, kernel_m, into);
@@ -305,7 +305,7 @@ impl Odometry {
                     break;
                 }
             }
-            found.judge(&self.correspondences[..count], count, kernel_m);
+            found.evaluate(&self.correspondences[..count], count, kernel_m);
         }
         found
     }
@@ -332,7 +332,7 @@ fn is_located(found: &Registration) -> bool {
 }
 
 /// The constant motion that led here in `dt_s`, along the current axes of the vehicle.
-fn at_now(before_from_now: &Pose, dt_s: f64) -> Twist {
+fn constant_twist(before_from_now: &Pose, dt_s: f64) -> Twist {
     before_from_now.inverse().twist(-dt_s)
 }
 

@@ -12,7 +12,7 @@ fn located(rig: &Rig, sweeps: &[SimSweep]) -> Vec<Located> {
     sweeps.iter().map(|s| odometry.locate(s.stamp_s, &s.points, rig)).collect()
 }
 
-fn way(sweep: &SimSweep, since: &SimSweep) -> Pose {
+fn relative_pose(sweep: &SimSweep, since: &SimSweep) -> Pose {
     since.world_from_vehicle.inverse() * sweep.world_from_vehicle
 }
 
@@ -21,17 +21,17 @@ fn drive(seed: u64, ego: Ego, sweeps: usize) -> Drive {
 }
 
 #[test]
-fn simulated_drives_from_nothing() {
+fn simulated_drives_end_to_end() {
     let turn = Ego::Turn { left: true, speed: 5.0 };
     for (seed, ego, count) in [(4, Ego::Straight { speed: 11.0 }, 10), (5, turn, 25)] {
         let drive = drive(seed, ego, count);
         let rig = drive.rig();
         let sweeps: Vec<SimSweep> = drive.into_iter().collect();
         let found = located(&rig, &sweeps);
-        assert_eq!(found[0].locating, Locating::Start);
-        assert!(found[1..].iter().all(|l| l.locating == Locating::Registered), "{found:?}");
+        assert_eq!(found[0].pose_status, PoseStatus::Start);
+        assert!(found[1..].iter().all(|l| l.pose_status == PoseStatus::Registered), "{found:?}");
         let (end, last) = (found[count - 1], &sweeps[count - 1]);
-        let truth = way(last, &sweeps[0]);
+        let truth = relative_pose(last, &sweeps[0]);
         let off = (truth.inverse() * end.world_from_vehicle).twist(1.0);
         let (metres, metres_away) = (off.linear.length(), truth.translation.length());
         assert!(metres < 0.003 * metres_away, "{metres} of {metres_away} m");
@@ -56,7 +56,7 @@ fn stamps_at_the_start_of_a_sweep() {
     let found = located(&rig, &sweeps);
     // The motion is constant: it is the same between stamps as between starts.
     for (sweep, found) in sweeps.iter().zip(&found) {
-        let off = way(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
+        let off = relative_pose(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
         assert!(off.translation.length() < 0.02, "{off:?}");
     }
 }
@@ -71,16 +71,17 @@ fn gaps() {
     sweeps[5].points.fill(bad);
     sweeps.remove(3);
     let found = located(&rig, &sweeps);
-    let lost: Vec<usize> = (1..8).filter(|n| found[*n].locating != Locating::Registered).collect();
-    assert_eq!((lost, found[4].locating), (vec![4], Locating::Lost), "{found:?}");
+    let lost: Vec<usize> =
+        (1..8).filter(|n| found[*n].pose_status != PoseStatus::Registered).collect();
+    assert_eq!((lost, found[4].pose_status), (vec![4], PoseStatus::Lost), "{found:?}");
     for (sweep, found) in sweeps.iter().zip(&found) {
-        let off = way(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
+        let off = relative_pose(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
         assert!(off.translation.length() < 0.05, "{off:?}");
     }
 }
 
 #[test]
-fn a_tunnel_does_not_tell_how_far() {
+fn a_tunnel_leaves_the_distance_undetermined() {
     let mut rng = Rng::new(9);
     let mut sweep = || -> Vec<Point> {
         let mut at = || {
@@ -94,8 +95,8 @@ fn a_tunnel_does_not_tell_how_far() {
     let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     for n in 0..4 {
         let found = odometry.locate(0.1 * f64::from(n), &sweep(), &rig);
-        let expected = if n == 0 { Locating::Start } else { Locating::Degenerate };
-        assert_eq!(found.locating, expected, "{found:?}");
+        let expected = if n == 0 { PoseStatus::Start } else { PoseStatus::Degenerate };
+        assert_eq!(found.pose_status, expected, "{found:?}");
     }
 }
 
@@ -133,7 +134,7 @@ fn motorway(rng: &mut Rng, sweep: usize, posts: bool) -> Vec<Point> {
 }
 
 #[test]
-fn a_motorway_among_others_does_not_tell_how_fast() {
+fn traffic_on_a_motorway_leaves_the_speed_undetermined() {
     let mut rng = Rng::new(3);
     let rig = at_stamp();
     let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
@@ -141,10 +142,10 @@ fn a_motorway_among_others_does_not_tell_how_fast() {
         .map(|n| odometry.locate(0.1 * n as f64, &motorway(&mut rng, n, n >= 12), &rig))
         .collect();
     let among = &found[1..12];
-    assert!(among.iter().all(|l| l.locating == Locating::Degenerate), "{among:?}");
+    assert!(among.iter().all(|l| l.pose_status == PoseStatus::Degenerate), "{among:?}");
     // Static structure decides, once there is some.
     let last = found[23];
-    assert_eq!(last.locating, Locating::Registered, "{last:?}");
+    assert_eq!(last.pose_status, PoseStatus::Registered, "{last:?}");
     assert!((last.twist.linear.x - 22.0).abs() < 0.3, "{last:?}");
 }
 
@@ -165,7 +166,7 @@ fn nothing_at_all() {
     let rig = drive(1, Ego::Standing, 1).rig();
     for n in 0..3 {
         let found = odometry.locate(0.1 * f64::from(n), &[], &rig);
-        let expected = if n == 0 { Locating::Start } else { Locating::Lost };
-        assert_eq!((found.locating, found.world_from_vehicle), (expected, Pose::IDENTITY));
+        let expected = if n == 0 { PoseStatus::Start } else { PoseStatus::Lost };
+        assert_eq!((found.pose_status, found.world_from_vehicle), (expected, Pose::IDENTITY));
     }
 }

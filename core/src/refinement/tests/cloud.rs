@@ -40,7 +40,7 @@ fn nearest_is_the_nearest() {
 }
 
 #[test]
-fn of_each_part_of_a_voxel_the_first_return_stays() {
+fn the_first_return_of_each_subvoxel_is_kept() {
     let mut random = Random(2);
     let mut returns = Returns::flat();
     for _ in 0..20_000 {
@@ -204,7 +204,7 @@ fn slopes_are_ground_and_boxes_on_them_are_not() {
 }
 
 #[test]
-fn a_bank_is_ground_and_a_car_before_it_is_not() {
+fn a_bank_is_ground_but_a_car_in_front_of_it_is_not() {
     let bank = |x: f32| GROUND + 0.4 * (x - 40.0).clamp(0.0, 12.0);
     let mut returns = Returns::ground(|x, _| bank(x));
     assert_eq!(occupied(&returns.cloud()), BTreeSet::new());

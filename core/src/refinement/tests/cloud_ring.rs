@@ -16,7 +16,7 @@ fn clusters_are_compared_with_every_other_sweep() {
         returns.add([10.5, 10.5, GROUND + 1.5 + n as f32], 0);
         let profile = profile();
         let sweep = returns.of_sweep(&profile, n as f64, &SENSORS);
-        ring.insert(&Alone, &scaled(), sweep, &mut apart, &mut scratch);
+        ring.insert(&SingleThread, &scaled(), sweep, &mut apart, &mut scratch);
         let Some(span_s) = ring.span_s() else { continue };
         let before = [1.0, -1.0, -3.0].into_iter().filter(|share| n as f32 - 1.0 + share >= 0.0);
         let shares: Vec<f32> = ring.targets(span_s).iter().map(|t| t.share).collect();

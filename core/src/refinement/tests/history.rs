@@ -43,7 +43,7 @@ fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks
 }
 
 #[test]
-fn what_comes_from_elsewhere_is_fresh_and_what_stands_is_worn() {
+fn arrivals_are_fresh_and_static_structure_is_worn() {
     // Nothing was hit in front of the block before it came: in one column one sweep back, in two
     // columns two sweeps back, and so on up to all four.
     let mover = looks(1.0, |n| 10 + n, |_| 0);
@@ -55,21 +55,21 @@ fn what_comes_from_elsewhere_is_fresh_and_what_stands_is_worn() {
 }
 
 #[test]
-fn the_window_goes_along() {
+fn the_window_follows_the_vehicle() {
     let moving_window = |n| 2 * n - 5;
     assert_eq!(looks(1.0, |n| 15 + n, moving_window), looks(1.0, |n| 15 + n, |_| 0));
     assert_eq!(looks(1.0, |_| 15, moving_window), looks(1.0, |_| 15, |_| 0));
 }
 
 #[test]
-fn nothing_is_known_of_what_it_hides_itself_or_of_no_sweep() {
+fn nothing_is_known_where_hidden_or_without_a_sweep() {
     // Slower than a column over all sweeps: each place may have been its own.
     assert_eq!(looks(0.05, |_| 10, |_| 0), Looks::default());
     assert_eq!((Looks::default().worn(), Looks::default().fresh()), (0.0, 0.0));
 }
 
 #[test]
-fn what_came_since_is_new() {
+fn arrivals_are_new() {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     let first = cloud(13, 0, SWEEPS);
     let new = |history: &History, since_s| -> Vec<usize> {
@@ -89,7 +89,7 @@ fn what_came_since_is_new() {
 }
 
 #[test]
-fn one_that_came_leaves_no_trace() {
+fn arrivals_leave_no_earlier_trace() {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     (0..SWEEPS).for_each(|n| history.push(cloud(10, 0, n).all(), |column| column % SIDE == 20));
     let mut of_column = vec![NONE; SIDE * SIDE];

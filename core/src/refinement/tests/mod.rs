@@ -18,7 +18,7 @@ use crate::random::Random;
 use crate::record::{NONE, pack_flow};
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::{Placed, Point};
-use crate::team::Alone;
+use crate::team::SingleThread;
 use crate::thinning::TakenPoints;
 use core::ops::Deref;
 use std::boxed::Box;
@@ -115,7 +115,7 @@ impl Returns {
         let (profile, scaled) = (profile(), scaled());
         let returns = self.of_sweep(&profile, 0.0, &SENSORS);
         let Kept { cloud, detail } = kept;
-        (cloud.fill(detail, &Alone, &scaled, returns, &mut apart, &mut scratch), apart)
+        (cloud.fill(detail, &SingleThread, &scaled, returns, &mut apart, &mut scratch), apart)
     }
 
     fn cloud(&self) -> Kept {
@@ -217,7 +217,7 @@ fn give_seen(
 ) {
     let mut apart = vec![false; returns.points.len()];
     let returns = returns.of_sweep(profile, n as f64 * 0.1, sensors);
-    refinement.insert_cloud(&Alone, returns, &mut apart);
+    refinement.insert_cloud(&SingleThread, returns, &mut apart);
 }
 
 fn all(points: &[Point]) -> TakenPoints<'_> {
@@ -229,23 +229,23 @@ fn no_flow() -> Vec<Flow> {
 }
 
 fn run(refinement: &mut Refinement, flows: &[Flow]) {
-    run_knowing(refinement, flows, None, &[]);
+    run_with_scores(refinement, flows, None, &[]);
 }
 
 /// The same, with every tracklet predicting a displacement.
-fn run_expecting(refinement: &mut Refinement, flows: &[Flow], expected: Option<[f32; 2]>) {
-    run_knowing(refinement, flows, expected, &[]);
+fn run_with_prediction(refinement: &mut Refinement, flows: &[Flow], expected: Option<[f32; 2]>) {
+    run_with_scores(refinement, flows, expected, &[]);
 }
 
 /// The same with the encoder's scores.
-fn run_knowing(
+fn run_with_scores(
     refinement: &mut Refinement,
     flows: &[Flow],
     expected: Option<[f32; 2]>,
     scores: &[ColumnScores],
 ) {
     let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
-    refinement.run(&Alone, &step, flows, scores, |_| {
+    refinement.run(&SingleThread, &step, flows, scores, |_| {
         expected.map(|by| Prediction { by, certainty: 3.0 })
     });
 }

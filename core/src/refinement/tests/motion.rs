@@ -66,7 +66,7 @@ fn side(centre: f32, random: &mut Random) -> Returns {
 }
 
 #[test]
-fn ends_tell_how_far_a_side_slid() {
+fn ends_determine_how_far_a_side_slid() {
     // Registration alone leaves all of them at rest: any displacement along the side fits it.
     for by in [5.3, -4.1, 3.2] {
         let mut random = Random(12);
@@ -84,7 +84,7 @@ fn ends_tell_how_far_a_side_slid() {
 }
 
 #[test]
-fn what_is_seen_later_has_moved_for_longer() {
+fn later_returns_have_moved_for_longer() {
     // Seen 4 ms later in each successive sweep, like a car being overtaken.
     let late = 0.004;
     for n in 0..16 {
@@ -111,7 +111,7 @@ fn what_is_seen_later_has_moved_for_longer() {
 }
 
 #[test]
-fn what_stands_is_exactly_still() {
+fn static_structure_is_exactly_static() {
     let mut random = Random(5);
     for n in 0..30 {
         let car = Car { centre: [30.0 + 0.1 * n as f32, 31.0], yaw: 0.2 * n as f32 };
@@ -126,7 +126,7 @@ fn what_stands_is_exactly_still() {
 }
 
 #[test]
-fn columns_that_could_not_move_are_left_behind() {
+fn immovable_columns_are_dropped() {
     let mut random = Random(9);
     let of = |n: usize| Car { centre: [25.0 + 2.0 * n as f32, 31.0], yaw: 0.3 };
     let sweeps: Vec<Returns> = (0..3).map(|n| sweep_of(&of(n), &mut random)).collect();
@@ -136,7 +136,7 @@ fn columns_that_could_not_move_are_left_behind() {
     let found = |scores: &[ColumnScores]| {
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        run_knowing(&mut refinement, &flows, None, scores);
+        run_with_scores(&mut refinement, &flows, None, scores);
         motions(&refinement)
     };
     let scores: Vec<ColumnScores> =
@@ -153,7 +153,7 @@ fn columns_that_could_not_move_are_left_behind() {
 }
 
 #[test]
-fn few_returns_move_nothing_by_themselves() {
+fn few_returns_alone_move_nothing() {
     for count in 0..5 {
         let cluster = |n: usize| {
             let mut returns = Returns::flat();
@@ -170,7 +170,7 @@ fn few_returns_move_nothing_by_themselves() {
 }
 
 #[test]
-fn a_wall_that_seems_to_move_stands() {
+fn a_wall_that_seems_to_move_is_static() {
     // Longer than anything that moves, with a moving pattern.
     let big = Profile { side: 167, ..Profile::hdl64() };
     let wall = |n: usize| {
@@ -200,8 +200,9 @@ fn a_wall_that_seems_to_move_stands() {
     sweeps.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &big, r, n));
     let flows = vec![pack_flow([10, 0]); 167 * 167];
     let step = SweepUniform { side: 167, ..SweepUniform::default() };
-    refinement
-        .run(&Alone, &step, &flows, &[], |_| Some(Prediction { by: [10.0, 0.0], certainty: 3.0 }));
+    refinement.run(&SingleThread, &step, &flows, &[], |_| {
+        Some(Prediction { by: [10.0, 0.0], certainty: 3.0 })
+    });
     let extent_max = scaled().extent_max;
     let longest = refinement.clusters.found().iter().map(|f| f.extent).fold(0.0, f32::max);
     assert!(longest > extent_max, "{longest}");
@@ -227,11 +228,11 @@ fn long_side(moved: f32) -> Returns {
 }
 
 #[test]
-fn what_moved_goes_on_by_less() {
+fn recent_movers_need_less_evidence() {
     let moving = |sweeps: &[Returns; 3], expected| {
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        run_expecting(&mut refinement, &no_flow(), expected);
+        run_with_prediction(&mut refinement, &no_flow(), expected);
         motions(&refinement).iter().flatten().count()
     };
     let steady = [0.0, 1.2, 2.4].map(long_side);
@@ -247,14 +248,14 @@ fn scored(score: i8) -> Vec<ColumnScores> {
 }
 
 #[test]
-fn the_rest_of_a_body_goes_with_the_part_that_tells() {
+fn the_rest_of_a_body_follows_its_moving_part() {
     let moving = |sweeps: &[Returns; 3], scores: &[ColumnScores]| {
         // Only what lies in front of the side has a match.
         let flow = |c: usize| if c % SIDE < 30 { pack_flow([1, 0]) } else { 0 };
         let flows: Vec<Flow> = (0..SIDE * SIDE).map(flow).collect();
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        run_knowing(&mut refinement, &flows, None, scores);
+        run_with_scores(&mut refinement, &flows, None, scores);
         motions(&refinement).iter().flatten().count()
     };
     let steady = [0.0, 1.2, 2.4].map(long_side);
@@ -273,7 +274,7 @@ fn columns_with_returns(cloud: DetailedCloud) -> Vec<u32> {
 }
 
 #[test]
-fn what_could_move_may_go_where_nothing_is_seen() {
+fn potential_movers_may_go_where_nothing_is_seen() {
     let mut random = Random(10);
     let [first, second] =
         [25.0, 27.0].map(|x| sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random));
@@ -308,7 +309,7 @@ fn what_could_move_may_go_where_nothing_is_seen() {
 }
 
 #[test]
-fn what_comes_into_the_window_was_beyond_it() {
+fn objects_entering_the_window_were_outside() {
     let mut random = Random(12);
     // A third of the car was outside the window in the sweep before the pair.
     let [earlier, first, second] = [61.0, 53.0, 45.0]
@@ -326,7 +327,7 @@ fn what_comes_into_the_window_was_beyond_it() {
 }
 
 #[test]
-fn who_walks_along_a_wall_is_found() {
+fn pedestrians_along_a_wall_are_found() {
     // 1 m/s, a third of a voxel per sweep, a column away from a wall that is in the same cluster.
     let mut random = Random(11);
     let mut sweep = |n: usize| {

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn odd_sweeps_yield_no_nonsense() {
+fn odd_sweeps_give_valid_results() {
     let mut random = Random(6);
     let mut column = Returns::flat();
     for _ in 0..50_000 {

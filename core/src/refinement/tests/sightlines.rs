@@ -28,7 +28,7 @@ fn sightlines(sensors: &SensorPaths, ends: &[([f32; 3], u32, f32)]) -> Box<Sight
 }
 
 #[test]
-fn a_ray_goes_through_ends_at_a_place_or_before_it() {
+fn rays_pass_through_end_at_or_stop_before_a_place() {
     let sensors = SensorPaths::at_rest(EYES);
     // All around the sensor, including across the seam of azimuths.
     for n in 0..400 {
@@ -54,7 +54,7 @@ fn a_ray_goes_through_ends_at_a_place_or_before_it() {
 }
 
 #[test]
-fn the_nearest_ray_of_all_sensors_tells() {
+fn the_nearest_ray_of_all_sensors_decides() {
     let sensors = SensorPaths::at_rest(EYES);
     let place = [30.0, 30.0, 5.0];
     let through = |sensor: usize, off: f32| {
@@ -81,7 +81,7 @@ fn the_nearest_ray_of_all_sensors_tells() {
 }
 
 #[test]
-fn a_sensor_is_where_it_was_as_it_looked() {
+fn sensor_origin_is_taken_at_the_time_of_the_return() {
     // It moves 7 voxels per sweep and rotates once, clockwise from the rear; at 20 voxels, 7 voxels
     // are 19 degrees.
     let twist = Twist { linear: glam::DVec3::X * 21.0, ..Default::default() };
@@ -147,7 +147,7 @@ fn more_rays_than_there_is_room_for_are_thinned_evenly() {
 }
 
 #[test]
-fn a_ring_that_moves_with_the_sensor_stands() {
+fn a_ring_moving_with_the_sensor_is_static() {
     // A wall 6 voxels beside the path, at 7 voxels per sweep; one ring is seen on it: a hyperbola.
     let wall = |n: usize| {
         let eye = [10.0 + 7.0 * n as f32, 20.0, GROUND + 6.0];

@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clipped_walk_is_what_the_walk_has_in_the_window() {
+    fn clipping_a_walk_keeps_exactly_its_part_in_the_window() {
         let mut rng = crate::random::Random(7);
         let mut draw =
             |least: i32, most: i32| least + rng.below((most - least + 1) as usize) as i32;

@@ -192,7 +192,7 @@ fn displaced_mean(factor: f64, innovation_sweeps: f32) -> (f32, f32) {
 }
 
 #[test]
-fn displacements_that_err_by_themselves() {
+fn displacements_with_independent_errors() {
     // Chi-square with 2 degrees of freedom. If they were taken as differences of positions with
     // independent errors, it would be 2.7: such errors cancel over time.
     let (scale, d2) = displaced_mean(1.0, 0.0);
@@ -202,7 +202,7 @@ fn displacements_that_err_by_themselves() {
 }
 
 #[test]
-fn innovations_tell_how_large_the_noise_is() {
+fn noise_is_estimated_from_innovations() {
     for factor in [0.5, 1.0, 2.0] {
         let (scale, d2) = displaced_mean(factor, 8.0);
         std::println!("noise times {factor}: scale {scale}, mean squared error {d2}");

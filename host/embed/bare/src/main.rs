@@ -24,7 +24,7 @@ use raywake_core::output::Status;
 use raywake_core::params::Profile;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Rig, Timing};
-use raywake_core::team::Alone;
+use raywake_core::team::SingleThread;
 use raywake_embed::{EstimatorOptions, FlowEstimator, Memory, SweepPlace};
 
 /// Memory for the estimator: enough for what it asks for.
@@ -64,7 +64,7 @@ fn run(memory: Memory, out: &mut impl Write) -> fmt::Result {
         let pose = Pose { translation: DVec3::new(time_s, 0.0, 0.0), ..Pose::IDENTITY };
         let twist = Some(Twist { linear: DVec3::X, angular: DVec3::ZERO });
         let place = SweepPlace { stamp_s: time_s, pose: Some(pose), twist };
-        match estimator.step(&Alone, &place, scene::returns(time_s)) {
+        match estimator.step(&SingleThread, &place, scene::returns(time_s)) {
             Ok(step) => writeln!(out, "sweep {n}    {} foreground columns", step.foreground)?,
             Err(e) => writeln!(out, "sweep {n}    {e}")?,
         }

@@ -22,12 +22,12 @@ const LEVELS: usize = 10;
 
 /// Holds the files of one recording after another.
 static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
-    bear_guarded_panics();
+    ignore_guarded_panics();
     TempDir::new().expect("a temporary folder")
 });
 
 /// A panic in a third-party decoder is caught and does not count as a finding.
-fn bear_guarded_panics() {
+fn ignore_guarded_panics() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         if damaged().is_none() {

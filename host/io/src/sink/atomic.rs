@@ -89,10 +89,10 @@ fn create_locked(path: &Path) -> io::Result<File> {
             }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
                 // While it is locked here, nobody else removes it.
-                match LeftOver::at(path)? {
-                    LeftOver::Gone => (),
-                    LeftOver::Locked => return Err(busy()),
-                    LeftOver::Free(_locked) => fs::remove_file(path)?,
+                match Leftover::at(path)? {
+                    Leftover::Gone => (),
+                    Leftover::Locked => return Err(busy()),
+                    Leftover::Free(_locked) => fs::remove_file(path)?,
                 }
             }
             Err(e) => return Err(e),
@@ -102,7 +102,7 @@ fn create_locked(path: &Path) -> io::Result<File> {
 }
 
 /// What already exists at the path of a temporary file.
-enum LeftOver {
+enum Leftover {
     /// Nothing any more: it was renamed, or another process removed it.
     Gone,
     /// A file that another process is writing.
@@ -111,20 +111,20 @@ enum LeftOver {
     Free(Option<File>),
 }
 
-impl LeftOver {
-    fn at(path: &Path) -> io::Result<LeftOver> {
+impl Leftover {
+    fn at(path: &Path) -> io::Result<Leftover> {
         let gone = |e: &io::Error| e.kind() == ErrorKind::NotFound;
         // Opening a pipe would wait for its other end.
         match path.symlink_metadata() {
             Ok(there) if there.is_file() => (),
-            Err(e) if gone(&e) => return Ok(LeftOver::Gone),
-            other => return other.map(|_| LeftOver::Free(None)),
+            Err(e) if gone(&e) => return Ok(Leftover::Gone),
+            other => return other.map(|_| Leftover::Free(None)),
         }
         Ok(match File::open(path) {
-            Err(e) if gone(&e) => LeftOver::Gone,
-            Ok(file) if !lock(&file) => LeftOver::Locked,
-            Ok(file) if !is_at(&file, path) => LeftOver::Gone,
-            file => LeftOver::Free(file.ok()),
+            Err(e) if gone(&e) => Leftover::Gone,
+            Ok(file) if !lock(&file) => Leftover::Locked,
+            Ok(file) if !is_at(&file, path) => Leftover::Gone,
+            file => Leftover::Free(file.ok()),
         })
     }
 }

@@ -21,7 +21,7 @@ impl Absent {
     pub fn create(streams: &StreamTargets, _: u64, _: Content) -> Result<Option<Absent>, Error> {
         match streams.is_empty() {
             true => Ok(None),
-            false => Err(Error::lacking("a stream of messages", "mcap")),
+            false => Err(Error::missing_feature("a stream of messages", "mcap")),
         }
     }
 
@@ -31,7 +31,7 @@ impl Absent {
     }
 
     /// Never called.
-    pub fn is_watched(&self) -> bool {
+    pub fn has_viewer(&self) -> bool {
         match *self {}
     }
 

@@ -87,7 +87,7 @@ mod tests {
     use crate::source::tests::Temp;
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let temp = Temp::new();
         let point = |n: u8| Point {
             position: [n.into(), -2.5, 1e-3 * f32::from(n)],

@@ -19,7 +19,7 @@ impl NoParquet {
 
     /// Fails with [`Error::Unsupported`].
     pub fn append(&mut self, _: TableWriter, _: Meta<'_>) -> Result<(), Error> {
-        Err(Error::lacking("a Parquet file", "parquet"))
+        Err(Error::missing_feature("a Parquet file", "parquet"))
     }
 
     /// Does nothing: nothing was written.

@@ -88,7 +88,7 @@ impl TableWriter {
     /// Fails: this build does not support feather files.
     #[cfg(not(feature = "arrow"))]
     pub fn file(self, path: &Path, _: Meta<'_>) -> Result<Vec<u8>, Error> {
-        Err(Error::lacking(path.display(), "arrow"))
+        Err(Error::missing_feature(path.display(), "arrow"))
     }
 }
 

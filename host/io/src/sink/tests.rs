@@ -45,7 +45,7 @@ fn a_file_is_whole_or_absent() {
 }
 
 #[test]
-fn what_was_left_is_removed_and_what_is_written_is_not() {
+fn stale_files_are_removed_and_files_being_written_are_not() {
     let t = Temp::new();
     let path = t.path().join("a.txt");
     t.write(".a.txt.partial", "left");
@@ -72,7 +72,7 @@ fn a_planted_link_is_not_followed() {
 
 #[cfg(unix)]
 #[test]
-fn a_planted_pipe_holds_nothing_up() {
+fn a_planted_pipe_does_not_block() {
     let t = Temp::new();
     let pipe = t.path().join(".a.txt.partial");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
@@ -203,7 +203,7 @@ mod tables {
     const MARK: SweepMark = SweepMark { frame: 7, stamp_s: 0.5, dt_s: 0.1 };
 
     #[test]
-    fn what_an_interrupted_run_left_is_kept() {
+    fn results_of_an_interrupted_run_are_kept() {
         let t = Temp::new();
         let rows = [ColumnFlow { age: 3, ..ColumnFlow::default() }];
         let write = |frame, rows: &[ColumnFlow]| {

@@ -39,7 +39,7 @@ impl BinFields {
     }
 
     /// KITTI's fields, or nuScenes' if the file name ends like its files'.
-    fn usual(path: &Path) -> BinFields {
+    fn default_fields(path: &Path) -> BinFields {
         let nuscenes = path.to_string_lossy().ends_with(".pcd.bin");
         let names = ["x", "y", "z", "intensity", "ring"].map(str::to_owned);
         BinFields(names[..if nuscenes { 5 } else { 4 }].to_vec())
@@ -58,13 +58,14 @@ impl BinFields {
 /// given, seems to have others.
 pub(super) fn read(
     path: &Path,
-    told: Option<&BinFields>,
+    given: Option<&BinFields>,
     points: &mut Vec<Point>,
 ) -> Result<bool, Error> {
     points.clear();
     let bytes = whole::read(path)?;
-    let (usual, wrong) = (BinFields::usual(path), |what| Error::input(path, "", what));
-    let fields = told.unwrap_or(&usual);
+    let (default_fields, wrong) =
+        (BinFields::default_fields(path), |what| Error::input(path, "", what));
+    let fields = given.unwrap_or(&default_fields);
     let (numbers, rest) = bytes.as_chunks::<NUMBER>();
     let (width, names) = (fields.0.len(), fields.0.join(", "));
     if !rest.is_empty() || numbers.len() % width != 0 {
@@ -77,7 +78,7 @@ pub(super) fn read(
     }
     let value = |row: usize, field: usize| f32::from_le_bytes(numbers[row * width + field]);
     let rows = numbers.len() / width;
-    let negative = (0..rows).filter(|row| told.is_none() && value(*row, 3) < 0.0).count();
+    let negative = (0..rows).filter(|row| given.is_none() && value(*row, 3) < 0.0).count();
     if negative as f64 > NEGATIVE_MAX * rows as f64 {
         let what = format!("{negative} of {rows} intensities are negative: other fields than");
         return Err(wrong(format!("{what} float32 {names}? (--bin-fields)")));
@@ -89,13 +90,14 @@ pub(super) fn read(
 /// The same for a `.npy` file, whose columns are x, y, z and intensity unless fields are given.
 pub(super) fn read_npy(
     path: &Path,
-    told: Option<&BinFields>,
+    given: Option<&BinFields>,
     points: &mut Vec<Point>,
 ) -> Result<bool, Error> {
     points.clear();
     let array = npy::read(path)?;
-    let (usual, width) = (BinFields::usual(path), array.columns);
-    let fields = told.map_or(&usual.0[..usual.0.len().min(width)], |told| &told.0);
+    let (default_fields, width) = (BinFields::default_fields(path), array.columns);
+    let fields =
+        given.map_or(&default_fields.0[..default_fields.0.len().min(width)], |given| &given.0);
     let wrong = |what| Error::input(path, "", what);
     if fields.len() > width {
         return Err(wrong(format!("{width} columns, expected {}", fields.join(", "))));
@@ -128,8 +130,8 @@ mod tests {
         assert!(what.contains("20 bytes, not a multiple of 16 (float32 x, y, z, i"), "{what}");
         let fields = BinFields::parse("x,y,z,intensity,ring").unwrap();
         let nuscenes = t.write("a__1.pcd.bin", floats(&five));
-        for (path, told) in [(&path, Some(&fields)), (&nuscenes, None)] {
-            assert!(!read(path, told, &mut points).unwrap());
+        for (path, given) in [(&path, Some(&fields)), (&nuscenes, None)] {
+            assert!(!read(path, given, &mut points).unwrap());
             let Point { position, intensity, .. } = points[19];
             assert_eq!((points.len(), position, intensity), (20, [-1.0, 2.0, -3.0], 0.2));
         }

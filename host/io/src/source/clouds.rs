@@ -47,7 +47,7 @@ impl Source for Clouds {
         let path = &self.files[index];
         read_cloud(path, self.fields.as_ref(), &mut into.points)?;
         if let Some(pose) = self.world_from_cloud.get(index) {
-            viewpoints::leave_world(&mut into.points, pose);
+            viewpoints::transform_from_world(&mut into.points, pose);
         }
         let Some(sidecars) = &self.sidecars else { return Ok(()) };
         sidecars.fill(path, &mut into.points).inspect_err(|_| into.points.clear())
@@ -93,7 +93,7 @@ fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
 
 #[cfg(not(feature = "arrow"))]
 fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
-    Err(Error::lacking(format!("{}, a feather file,", path.display()), "arrow"))
+    Err(Error::missing_feature(format!("{}, a feather file,", path.display()), "arrow"))
 }
 
 /// Extensions of the clouds in a folder of clouds.

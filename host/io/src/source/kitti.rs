@@ -21,11 +21,11 @@ use crate::Error;
 
 /// Duration of a revolution of KITTI's scanner if stamps do not give it, s: the median by the
 /// scanner's own stamps in the raw drives.
-const TURN_S: f64 = 0.1036;
+const PERIOD_S: f64 = 0.1036;
 
 /// Revolution times of an HDL-64E, s (20 to 5 Hz). Stamps outside are not those of single
 /// revolutions.
-const TURN_LIMITS_S: [f64; 2] = [0.05, 0.2];
+const PERIOD_LIMITS_S: [f64; 2] = [0.05, 0.2];
 
 /// Height of the ground under KITTI's Velodyne, m.
 const GROUND_M: f64 = -1.73;
@@ -45,7 +45,9 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Er
         _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
         None if drive.join("oxts/data").is_dir() => opening.read_oxts()?,
-        None => options.go_without_poses(&opening.root, "neither `poses.txt` nor `oxts/data`")?,
+        None => {
+            options.proceed_without_poses(&opening.root, "neither `poses.txt` nor `oxts/data`")?
+        }
     }
     opening.sidecars = Sidecars::open(&drive.join("velodyne_points"))?;
     Ok(opening.finish(options))
@@ -61,7 +63,7 @@ pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Cl
     match options.poses.as_ref().or(own.iter().find(|p| p.is_file())) {
         _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Camera)?,
-        None => options.go_without_poses(&opening.root, "no `poses.txt`")?,
+        None => options.proceed_without_poses(&opening.root, "no `poses.txt`")?,
     }
     Ok(opening.finish(options))
 }
@@ -84,9 +86,9 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
         }
         _ if viewpoints.is_some() => opening.take_viewpoints(viewpoints, options),
         _ if options.unlocated == Unlocated::Always => {}
-        _ => options.go_without_poses(&opening.root, "point clouds only")?,
+        _ => options.proceed_without_poses(&opening.root, "point clouds only")?,
     }
-    opening.look_at_returns(options)?;
+    opening.inspect_returns(options)?;
     Ok(opening.finish(options))
 }
 
@@ -240,11 +242,11 @@ impl Opening {
     }
 
     /// Learns from the first cloud when its returns were measured, and where the ground is.
-    fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
+    fn inspect_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let (path, mut points) = (&self.files[0].1, Vec::new());
         let timed = read_cloud(path, options.bin_fields.as_ref(), &mut points)?;
         if let Some(pose) = self.world_from_cloud.first() {
-            viewpoints::leave_world(&mut points, pose);
+            viewpoints::transform_from_world(&mut points, pose);
         }
         if timed {
             self.span = first_sweep::span(&points).map_err(|what| Error::input(path, "", what))?;
@@ -295,7 +297,7 @@ impl Opening {
             sensors: core::iter::once(Pose::IDENTITY).collect(),
             timing: match self.span {
                 Some([from_s, span_s]) => Timing::Offset { from_s, span_s },
-                None => Timing::Azimuth { span_s: self.turn_s(frames) },
+                None => Timing::Azimuth { span_s: self.period_s(frames) },
             },
             distorted: true,
             ground_m: self.ground_m,
@@ -307,7 +309,7 @@ impl Opening {
     /// time between sweeps of consecutive numbers, without those far from the median, where a
     /// revolution is missing. The mean, because with a coarse clock the median is a whole number of
     /// its steps.
-    fn turn_s(&self, frames: &[u64]) -> f64 {
+    fn period_s(&self, frames: &[u64]) -> f64 {
         let stamps = self.track.stamps_s.windows(2);
         let mut steps: Vec<f64> = frames
             .windows(2)
@@ -316,11 +318,11 @@ impl Opening {
             .map(|(_, s)| s[1] - s[0])
             .collect();
         if !self.timed {
-            return TURN_S;
+            return PERIOD_S;
         }
-        let Some(median) = median(steps.clone(), f64::total_cmp) else { return TURN_S };
+        let Some(median) = median(steps.clone(), f64::total_cmp) else { return PERIOD_S };
         steps.retain(|s| (0.6 * median..1.6 * median).contains(s));
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        mean.clamp(TURN_LIMITS_S[0], TURN_LIMITS_S[1])
+        mean.clamp(PERIOD_LIMITS_S[0], PERIOD_LIMITS_S[1])
     }
 }

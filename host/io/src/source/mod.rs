@@ -274,7 +274,10 @@ macro_rules! opened {
         }
         #[cfg(not(feature = $feature))]
         fn open(root: &Path, _: &OpenOptions) -> Opened {
-            Err(Error::lacking(format!(concat!("{}, ", $is, ","), root.display()), $feature))
+            Err(Error::missing_feature(
+                format!(concat!("{}, ", $is, ","), root.display()),
+                $feature,
+            ))
         }
         open
     }};

@@ -62,7 +62,7 @@ pub struct OpenOptions {
 impl OpenOptions {
     /// Leaves the poses of a recording unknown, or fails if they are needed; `found` says what was
     /// found instead.
-    pub(super) fn go_without_poses(&self, root: &Path, found: &str) -> Result<(), Error> {
+    pub(super) fn proceed_without_poses(&self, root: &Path, found: &str) -> Result<(), Error> {
         match self.unlocated {
             Unlocated::Refuse => {
                 let what = format!("{found}: poses are needed, give a file with --poses");

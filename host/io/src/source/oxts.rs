@@ -92,10 +92,10 @@ mod tests {
         let a = pose(&[49.0, 8.4, 100.0, 0.0, 0.0, FRAC_PI_2], s);
         let b = pose(&[49.001, 8.4, 101.0, 0.0, 0.0, FRAC_PI_2], s);
         // Heading north: the displacement is forward.
-        let way = (a.inverse() * b).translation;
+        let moved = (a.inverse() * b).translation;
         let expected = EARTH_RADIUS_M * 0.001f64.to_radians();
-        assert!((way.x - expected).abs() < 0.01, "{way}");
-        assert!(way.y.abs() < 1e-6 && (way.z - 1.0).abs() < 1e-9, "{way}");
+        assert!((moved.x - expected).abs() < 0.01, "{moved}");
+        assert!(moved.y.abs() < 1e-6 && (moved.z - 1.0).abs() < 1e-9, "{moved}");
     }
 
     #[test]

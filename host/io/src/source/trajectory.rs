@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn poses_between_others() {
+    fn poses_are_interpolated() {
         let mut trajectory = Trajectory::default();
         for n in [2, 0, 1, 9] {
             trajectory.add(n * 100_000_000, Pose::planar(n as f64, 0.0, 0.0, 0.1 * n as f64));

@@ -34,7 +34,7 @@ pub(super) fn read(files: &[(u64, PathBuf)]) -> Result<Option<(Vec<Pose>, bool)>
 }
 
 /// Transforms points from the world to the frame of a pose.
-pub(super) fn leave_world(points: &mut [Point], pose: &Pose) {
+pub(super) fn transform_from_world(points: &mut [Point], pose: &Pose) {
     let vehicle_from_world = pose.inverse();
     for point in points {
         let at = DVec3::from_array(point.position.map(f64::from));

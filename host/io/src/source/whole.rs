@@ -109,7 +109,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_never_ends() {
+    fn endless_files() {
         let t = Temp::new();
         let endless = t.path().join("a.bin");
         std::os::unix::fs::symlink("/dev/zero", &endless).unwrap();

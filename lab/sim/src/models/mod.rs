@@ -72,7 +72,7 @@ mod tests {
     fn parts_stay_in_the_box() {
         let mut rng = Rng::new(3);
         for (model, class, length) in (0..20).flat_map(|_| ALL) {
-            let object = model(1, Path::standing(0.0, 0.0, 0.0), &mut rng);
+            let object = model(1, Path::stationary(0.0, 0.0, 0.0), &mut rng);
             assert_eq!(object.class, class);
             assert!((length[0]..=length[1]).contains(&object.size[0]), "{object:?}");
             let box_half = DVec3::from_array(object.size) * 0.5;
@@ -85,7 +85,7 @@ mod tests {
             assert!((pose.translation.z - 0.5 * object.size[2]).abs() < 1e-12);
             let reach = object.reach() / box_half.length();
             assert!((0.8..1.4).contains(&reach), "{class:?}: {reach}");
-            assert!(object.is_still());
+            assert!(object.is_static());
         }
     }
 }

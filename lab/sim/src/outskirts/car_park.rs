@@ -168,14 +168,14 @@ impl CarPark {
 
     /// Out of a bay in reverse, a stop, and off along the aisle.
     fn leaving_bay(&self, rng: &mut Rng, [x, y, yaw]: [f64; 3], duration_s: f64) -> Path {
-        let (speed, way) = (rng.range(1.0, 1.9), rng.sign());
+        let (speed, sign) = (rng.range(1.0, 1.9), rng.sign());
         let radius = rng.range(4.0, 5.0);
         let begin = rng.range(-4.0, 0.6 * duration_s);
         let start = Path::starting(begin, State { x, y, yaw, speed: 0.0 });
         // A metre or two straight, then the tail swings into the aisle.
         let straight = rng.range(2.2, 3.2);
         let path = start.then(1.0, -speed, 0.0).then(straight / speed, 0.0, 0.0);
-        let path = path.then(FRAC_PI_2 * radius / speed, 0.0, way / radius);
+        let path = path.then(FRAC_PI_2 * radius / speed, 0.0, sign / radius);
         path.then(1.0, speed, 0.0).then(rng.range(0.3, 1.5), 0.0, 0.0).then(2.0, 1.2, 0.0)
     }
 
@@ -201,23 +201,23 @@ impl CarPark {
                 };
                 let out = if crowd.rng.chance(0.3) { PI } else { 0.0 };
                 let [dx, dy, turn] = [0.15, 0.3, 0.04].map(|far| crowd.rng.range(-far, far));
-                crowd.park(model, Path::standing(x + dx, y + dy, yaw + out + turn));
+                crowd.park(model, Path::stationary(x + dx, y + dy, yaw + out + turn));
             }
         }
     }
 
     /// Along an aisle in search of a bay.
     fn searching(&self, rng: &mut Rng, duration_s: f64) -> Path {
-        let (way, speed) = (rng.sign(), rng.range(1.0, 3.0));
-        let y = self.middle(aisle(rng)) - way * rng.range(0.8, 1.6);
-        let gone = way * speed * rng.range(0.0, duration_s);
+        let (sign, speed) = (rng.sign(), rng.range(1.0, 3.0));
+        let y = self.middle(aisle(rng)) - sign * rng.range(0.8, 1.6);
+        let gone = sign * speed * rng.range(0.0, duration_s);
         let x = self.speed * 0.5 * duration_s + rng.range(-30.0, 30.0) - gone;
-        Path::from(State { x, y, yaw: if way > 0.0 { 0.0 } else { PI }, speed })
+        Path::from(State { x, y, yaw: if sign > 0.0 { 0.0 } else { PI }, speed })
     }
 
     fn waiting(&self, rng: &mut Rng, duration_s: f64) -> Path {
         let State { x, y, yaw, .. } = self.walking(rng, duration_s).at(0.0);
-        Path::standing(x, y, yaw)
+        Path::stationary(x, y, yaw)
     }
 
     /// Along an aisle, between parked cars, or in any direction, sometimes with a turn.

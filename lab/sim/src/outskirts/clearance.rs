@@ -49,7 +49,7 @@ impl Outline {
 
 /// The area that a box covers over time.
 #[derive(Clone, Debug)]
-pub(super) struct Way {
+pub(super) struct SweptArea {
     /// By time; a single one if it never moves.
     outlines: Vec<Outline>,
     /// Lowest and highest corner.
@@ -58,31 +58,31 @@ pub(super) struct Way {
     span: [f64; 2],
 }
 
-impl Way {
-    fn of(outlines: Vec<Outline>, span: [f64; 2]) -> Way {
+impl SweptArea {
+    fn of(outlines: Vec<Outline>, span: [f64; 2]) -> SweptArea {
         let start = [DVec2::INFINITY, DVec2::NEG_INFINITY];
         let bounds = outlines
             .iter()
             .flat_map(Outline::corners)
             .fold(start, |[low, high], corner| [low.min(corner), high.max(corner)]);
-        Way { outlines, bounds, span }
+        SweptArea { outlines, bounds, span }
     }
 
     /// Of a box of this length, width and height, enlarged by `margin` all around (m), on a path
     /// during a drive.
-    pub(super) fn along(path: &Path, size: [f64; 3], margin: f64, duration_s: f64) -> Way {
+    pub(super) fn along(path: &Path, size: [f64; 3], margin: f64, duration_s: f64) -> SweptArea {
         let half = 0.5 * DVec2::new(size[0], size[1]) + margin;
         let steps = ((duration_s + 2.0 * BEYOND_S) / CHECK_S).ceil() as u32 + 1;
-        let steps = if path.is_still() { 1 } else { steps };
+        let steps = if path.is_static() { 1 } else { steps };
         let outline = |n: u32| {
             let at = path.at(f64::from(n) * CHECK_S - BEYOND_S);
             Outline::new(at.x, at.y, at.yaw, half)
         };
-        Way::of((0..steps).map(outline).collect(), [STEP_M, size[2]])
+        SweptArea::of((0..steps).map(outline).collect(), [STEP_M, size[2]])
     }
 
     /// Of a fixture.
-    pub(super) fn under(fixture: &Fixture, ground: &Ground) -> Way {
+    pub(super) fn under(fixture: &Fixture, ground: &Ground) -> SweptArea {
         let (at, half) = (fixture.pose.translation, fixture.shape.half());
         let turn = fixture.pose.matrix();
         let upright = turn.z_axis.z > 1.0 - 1e-9;
@@ -92,11 +92,11 @@ impl Way {
             false => Outline::new(at.x, at.y, 0.0, around.truncate()),
         };
         let middle = at.z - ground.height(at.x, at.y);
-        Way::of(vec![outline], [middle - around.z, middle + around.z])
+        SweptArea::of(vec![outline], [middle - around.z, middle + around.z])
     }
 
     /// Whether the two are ever in the same place at the same time.
-    pub(super) fn meets(&self, other: &Way) -> bool {
+    pub(super) fn meets(&self, other: &SweptArea) -> bool {
         let apart = |axis: usize| {
             self.bounds[1][axis] < other.bounds[0][axis]
                 || other.bounds[1][axis] < self.bounds[0][axis]
@@ -105,7 +105,7 @@ impl Way {
         if above || apart(0) || apart(1) {
             return false;
         }
-        let at = |way: &Way, n: usize| way.outlines[n.min(way.outlines.len() - 1)];
+        let at = |area: &SweptArea, n: usize| area.outlines[n.min(area.outlines.len() - 1)];
         let count = self.outlines.len().max(other.outlines.len());
         (0..count).any(|n| at(self, n).touches(&at(other, n)))
     }
@@ -126,13 +126,13 @@ mod tests {
     fn crossing_at_the_same_time_and_later() {
         let to = |x: f64, y: f64, yaw: f64| {
             let path = Path::from(State { x, y, yaw, speed: 5.0 });
-            Way::along(&path, [4.0, 2.0, 1.5], 0.1, 6.0)
+            SweptArea::along(&path, [4.0, 2.0, 1.5], 0.1, 6.0)
         };
         let a = to(0.0, 0.0, 0.0);
         assert!(a.meets(&to(10.0, -10.0, FRAC_PI_2)), "at the same time");
         assert!(!a.meets(&to(10.0, -25.0, FRAC_PI_2)), "later");
         let still = |y: f64, height: f64| {
-            Way::along(&Path::standing(20.0, y, 0.7), [0.2, 0.2, height], 0.0, 6.0)
+            SweptArea::along(&Path::stationary(20.0, y, 0.7), [0.2, 0.2, height], 0.0, 6.0)
         };
         assert!(a.meets(&still(1.1, 1.0)) && still(1.1, 1.0).meets(&a), "on the way");
         assert!(!a.meets(&still(1.3, 1.0)), "beside");

@@ -13,7 +13,7 @@ use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// How much longer than a drive a path continues along the road, s.
-const ON_S: f64 = 20.0;
+const CONTINUATION_S: f64 = 20.0;
 
 pub(super) struct Country {
     axis: Bend,
@@ -197,13 +197,13 @@ impl Country {
 
     /// Someone in a lane who is somewhere near the vehicle at some time.
     fn driving(&self, rng: &mut Rng, long_s: f64, beside: f64, speeds: [f64; 2]) -> Path {
-        let (way, speed) = (rng.sign(), rng.range(speeds[0], speeds[1]));
+        let (sign, speed) = (rng.sign(), rng.range(speeds[0], speeds[1]));
         let (t, ahead) = (rng.range(0.0, long_s), rng.range(-60.0, 60.0));
-        let station = self.speed * t + ahead - way * speed * t;
-        let place = [station, -way * beside];
+        let station = self.speed * t + ahead - sign * speed * t;
+        let place = [station, -sign * beside];
         match speed > 6.0 && rng.chance(0.25) {
-            true => self.changing(rng, place, way, [speed, t], long_s),
-            false => self.axis.follow(place, way, speed, long_s + ON_S),
+            true => self.changing(rng, place, sign, [speed, t], long_s),
+            false => self.axis.follow(place, sign, speed, long_s + CONTINUATION_S),
         }
     }
 
@@ -212,16 +212,16 @@ impl Country {
         &self,
         rng: &mut Rng,
         place: [f64; 2],
-        way: f64,
+        sign: f64,
         [speed, from_s]: [f64; 2],
         long_s: f64,
     ) -> Path {
-        let (later, turn) = (speed * rng.range(0.5, 1.3), self.axis.turn(place[1], way));
+        let (later, turn) = (speed * rng.range(0.5, 1.3), self.axis.turn(place[1], sign));
         let rate = 2.0f64.copysign(later - speed);
-        Path::from(self.axis.state(place, way, speed))
+        Path::from(self.axis.state(place, sign, speed))
             .then(from_s, 0.0, turn)
             .then((later - speed) / rate, rate, turn)
-            .then(long_s + ON_S, 0.0, turn)
+            .then(long_s + CONTINUATION_S, 0.0, turn)
     }
 }
 
@@ -255,7 +255,7 @@ impl Layout for Country {
             }
             false => {
                 let long_s = (self.stations[1] - VIEW_M) / self.speed.max(1.0);
-                self.axis.follow([0.0, lane], 1.0, self.speed, long_s + ON_S)
+                self.axis.follow([0.0, lane], 1.0, self.speed, long_s + CONTINUATION_S)
             }
         }
     }
@@ -288,7 +288,7 @@ impl Layout for Country {
         crowd.add(3.0, models::pedestrian, |r, t| self.driving(r, t, self.half + 0.35, [0.9, 1.7]));
         crowd.add(2.0, models::car, |r, _| {
             let place = [r.range(-40.0, self.stations[1]), -self.half - 0.6];
-            self.axis.follow(place, 1.0, 0.0, ON_S)
+            self.axis.follow(place, 1.0, 0.0, CONTINUATION_S)
         });
     }
 }

@@ -1,6 +1,6 @@
 //! Moving and parked objects: each on a path clear of fixtures, of the others and of the vehicle.
 
-use super::clearance::Way;
+use super::clearance::SweptArea;
 use crate::ground::Ground;
 use crate::object::{Fixture, Object};
 use crate::path::Path;
@@ -21,29 +21,29 @@ pub(super) struct Crowd<'a> {
     /// Duration of the drive, s.
     pub(super) duration_s: f64,
     density: f64,
-    taken: Vec<Way>,
+    taken: Vec<SweptArea>,
 }
 
 impl<'a> Crowd<'a> {
     /// An empty crowd among these fixtures, with the vehicle on its path.
     pub(super) fn new(
         (ground, fixtures): (&Ground, &[Fixture]),
-        vehicle: Way,
+        vehicle: SweptArea,
         (duration_s, density): (f64, f64),
         rng: &'a mut Rng,
     ) -> Crowd<'a> {
         let mut taken = vec![vehicle];
-        taken.extend(fixtures.iter().map(|fixture| Way::under(fixture, ground)));
+        taken.extend(fixtures.iter().map(|fixture| SweptArea::under(fixture, ground)));
         Crowd { objects: Vec::new(), rng, duration_s, density, taken }
     }
 
     /// Adds an object if its path is clear; returns whether it was.
-    pub(super) fn offer(&mut self, model: Model, path: Path) -> bool {
+    pub(super) fn try_add(&mut self, model: Model, path: Path) -> bool {
         let object = model(self.objects.len() as u32 + 1, path, self.rng);
-        let way = Way::along(&object.path, object.size, MARGIN_M, self.duration_s);
-        let clear = !self.taken.iter().any(|other| way.meets(other));
+        let swept = SweptArea::along(&object.path, object.size, MARGIN_M, self.duration_s);
+        let clear = !self.taken.iter().any(|other| swept.meets(other));
         if clear {
-            self.taken.push(way);
+            self.taken.push(swept);
             self.objects.push(object);
         }
         clear
@@ -52,7 +52,7 @@ impl<'a> Crowd<'a> {
     /// Adds a stationary object there, with the density as probability, if there is room.
     pub(super) fn park(&mut self, model: Model, path: Path) {
         if self.rng.chance(self.density) {
-            self.offer(model, path);
+            self.try_add(model, path);
         }
     }
 
@@ -66,7 +66,7 @@ impl<'a> Crowd<'a> {
         for _ in 0..(amount * self.density).round() as u32 {
             for _ in 0..TRIES {
                 let path = draw(self.rng, self.duration_s);
-                if self.offer(model, path) {
+                if self.try_add(model, path) {
                     break;
                 }
             }

@@ -164,11 +164,11 @@ impl Market {
 
     /// Someone walking up or down the street near the vehicle, perhaps with a turn.
     fn walking(&self, rng: &mut Rng, duration_s: f64) -> Path {
-        let (way, speed) = (rng.sign(), rng.range(0.5, 1.6));
+        let (sign, speed) = (rng.sign(), rng.range(0.5, 1.6));
         let t = rng.range(0.0, duration_s);
-        let x = self.speed * t + rng.range(-30.0, 30.0) - way * speed * t;
+        let x = self.speed * t + rng.range(-30.0, 30.0) - sign * speed * t;
         let y = rng.range(-1.0, 1.0) * (self.half - 0.5);
-        let yaw = if way > 0.0 { 0.0 } else { PI };
+        let yaw = if sign > 0.0 { 0.0 } else { PI };
         let path = Path::from(State { x, y, yaw: yaw + rng.range(-0.15, 0.15), speed });
         match rng.chance(0.35) {
             true => path.then(t, 0.0, 0.0).then_turn(rng.range(-1.6, 1.6), 0.8, 0.4),
@@ -179,7 +179,7 @@ impl Market {
     fn standing(&self, rng: &mut Rng, duration_s: f64) -> Path {
         let x = 0.5 * self.speed * duration_s + rng.range(-30.0, 30.0);
         let y = rng.sign() * rng.range(1.4, self.half - 0.4);
-        Path::standing(x, y, rng.range(-PI, PI))
+        Path::stationary(x, y, rng.range(-PI, PI))
     }
 }
 
@@ -231,7 +231,7 @@ impl Layout for Market {
     fn populate(&self, crowd: &mut Crowd) {
         crowd.add(2.0, models::van, |r, t| {
             let x = 0.5 * self.speed * t + r.range(-40.0, 50.0);
-            Path::standing(x, r.sign() * (self.half - 1.4), 0.0)
+            Path::stationary(x, r.sign() * (self.half - 1.4), 0.0)
         });
         crowd.add(3.0, models::cyclist, |r, t| {
             let path = self.walking(r, t);

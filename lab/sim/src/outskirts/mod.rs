@@ -23,7 +23,7 @@ use crate::ground::Ground;
 use crate::path::Path;
 use crate::rng::Rng;
 use crate::scene::Scene;
-use clearance::Way;
+use clearance::SweptArea;
 use crowd::Crowd;
 use raywake_core::pose::Pose;
 use site::Site;
@@ -111,13 +111,13 @@ pub(crate) fn draw(place: Place, seed: u64, duration_s: f64, density: f64) -> (S
     let layout = place.layout(&mut rng, duration_s);
     let ground = layout.ground().uneven(rng.range(0.004, 0.02));
     let path = layout.vehicle();
-    let way = Way::along(&path, VEHICLE, MARGIN_M, duration_s);
+    let swept = SweptArea::along(&path, VEHICLE, MARGIN_M, duration_s);
     let mut chance = Rng::split(seed, 6);
-    let mut site = Site::new(&ground, &mut chance, way.clone());
+    let mut site = Site::new(&ground, &mut chance, swept.clone());
     layout.furnish(&mut site);
     let fixtures = site.fixtures;
     let mut chance = Rng::split(seed, 7);
-    let mut crowd = Crowd::new((&ground, &fixtures), way, (duration_s, density), &mut chance);
+    let mut crowd = Crowd::new((&ground, &fixtures), swept, (duration_s, density), &mut chance);
     layout.populate(&mut crowd);
     let objects = crowd.objects;
     (Scene { ground, fixtures, objects, world_from_street }, path)

@@ -19,7 +19,7 @@ const INNER_M: f64 = 2.0;
 /// Width of the hard shoulder, m.
 const SHOULDER_M: f64 = 2.8;
 /// How much longer than a drive a path continues along the road, s.
-const ON_S: f64 = 20.0;
+const CONTINUATION_S: f64 = 20.0;
 
 pub(super) struct Motorway {
     axis: Bend,
@@ -168,38 +168,38 @@ impl Motorway {
     }
 
     /// In a lane either way, near the vehicle at some time of the drive.
-    fn driving(&self, rng: &mut Rng, long_s: f64, way: f64, lane: u32, speed: f64) -> Path {
+    fn driving(&self, rng: &mut Rng, long_s: f64, sign: f64, lane: u32, speed: f64) -> Path {
         let (t, ahead) = (rng.range(0.0, long_s), rng.range(-70.0, 90.0));
-        let station = self.speed * t + ahead - way * speed * t;
-        self.axis.follow([station, -way * self.lane(lane)], way, speed, long_s + ON_S)
+        let station = self.speed * t + ahead - sign * speed * t;
+        self.axis.follow([station, -sign * self.lane(lane)], sign, speed, long_s + CONTINUATION_S)
     }
 
     /// All traffic in one direction; oncoming vehicles are soon behind the vehicle, so there are
     /// more.
-    fn one_way(&self, crowd: &mut Crowd, way: f64) {
-        let a_second = if way < 0.0 { 0.2 } else { 0.03 };
+    fn one_way(&self, crowd: &mut Crowd, sign: f64) {
+        let a_second = if sign < 0.0 { 0.2 } else { 0.03 };
         let more = 1.0 + a_second * crowd.duration_s;
         for (amount, model) in [(4.0, models::truck as Model), (1.0, models::bus)] {
-            crowd.add(more * amount, model, |r, t| self.heavy(r, t, way));
+            crowd.add(more * amount, model, |r, t| self.heavy(r, t, sign));
         }
         for (amount, model) in
             [(9.0, models::car as Model), (2.0, models::van), (1.0, models::motorcycle)]
         {
-            crowd.add(more * amount, model, |r, t| self.car(r, t, way));
+            crowd.add(more * amount, model, |r, t| self.car(r, t, sign));
         }
     }
 
-    fn heavy(&self, rng: &mut Rng, long_s: f64, way: f64) -> Path {
+    fn heavy(&self, rng: &mut Rng, long_s: f64, sign: f64) -> Path {
         let speed = rng.range(21.0, 25.0);
-        self.driving(rng, long_s, way, 0, speed)
+        self.driving(rng, long_s, sign, 0, speed)
     }
 
     /// Speed and lane of a car.
-    fn car(&self, rng: &mut Rng, long_s: f64, way: f64) -> Path {
+    fn car(&self, rng: &mut Rng, long_s: f64, sign: f64) -> Path {
         let lane = (rng.unit() * f64::from(self.lanes)) as u32;
         let slow = 23.0 + 4.0 * f64::from(lane);
         let speed = rng.range(slow, slow + 5.0).min(35.0);
-        self.driving(rng, long_s, way, lane, speed)
+        self.driving(rng, long_s, sign, lane, speed)
     }
 }
 
@@ -221,7 +221,7 @@ impl Layout for Motorway {
     fn vehicle(&self) -> Path {
         let long_s = (self.stations[1] - VIEW_M) / self.speed;
         let offset = -self.lane(self.lane);
-        self.axis.follow([0.0, offset], 1.0, self.speed, long_s + ON_S)
+        self.axis.follow([0.0, offset], 1.0, self.speed, long_s + CONTINUATION_S)
     }
 
     fn furnish(&self, site: &mut Site) {
@@ -238,14 +238,14 @@ impl Layout for Motorway {
     }
 
     fn populate(&self, crowd: &mut Crowd) {
-        for way in [1.0, -1.0] {
-            self.one_way(crowd, way);
+        for sign in [1.0, -1.0] {
+            self.one_way(crowd, sign);
         }
         // A truck has stopped on the shoulder.
         crowd.add(1.0, models::truck, |r, _| {
             let side = r.sign();
             let place = [r.range(0.0, self.stations[1]), side * (self.edge() - 1.3)];
-            self.axis.follow(place, -side, 0.0, ON_S)
+            self.axis.follow(place, -side, 0.0, CONTINUATION_S)
         });
     }
 }

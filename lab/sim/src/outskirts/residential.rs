@@ -18,7 +18,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 /// Width of a footpath beside the road, m.
 const PATH_M: f64 = 1.6;
 /// How much longer than a drive a path lasts, s.
-const ON_S: f64 = 20.0;
+const CONTINUATION_S: f64 = 20.0;
 /// Longer than any drive, s.
 const LONG_S: f64 = 1e4;
 /// Width of a garage's driveway, m.
@@ -239,10 +239,10 @@ impl Residential {
     }
 
     fn driving(&self, rng: &mut Rng, long_s: f64, beside: f64, speeds: [f64; 2]) -> Path {
-        let (way, speed) = (rng.sign(), rng.range(speeds[0], speeds[1]));
+        let (sign, speed) = (rng.sign(), rng.range(speeds[0], speeds[1]));
         let (t, ahead) = (rng.range(0.0, long_s), rng.range(-40.0, 45.0));
-        let station = self.speed * t + ahead - way * speed * t;
-        self.axis.follow([station, -way * beside], way, speed, long_s + ON_S)
+        let station = self.speed * t + ahead - sign * speed * t;
+        self.axis.follow([station, -sign * beside], sign, speed, long_s + CONTINUATION_S)
     }
 
     /// On the footpath of either side, in either direction.
@@ -257,11 +257,11 @@ impl Residential {
         let out = if crowd.rng.chance(0.4) { 0.0 } else { PI };
         let [x, y, yaw] = self.at(station, side, crowd.rng.range(2.6, 3.2));
         if crowd.rng.chance(0.6) {
-            crowd.park(models::car, Path::standing(x, y, yaw + side * FRAC_PI_2 + out));
+            crowd.park(models::car, Path::stationary(x, y, yaw + side * FRAC_PI_2 + out));
         }
         if crowd.rng.chance(0.4) {
             let [x, y, yaw] = self.axis.at(station - 8.0, side * (self.half + 0.1));
-            crowd.park(models::car, Path::standing(x, y, yaw));
+            crowd.park(models::car, Path::stationary(x, y, yaw));
         }
     }
 
@@ -271,12 +271,12 @@ impl Residential {
         let drives: Vec<_> = self.drives.iter().filter(near).collect();
         let [station, side] = *drives[(rng.unit() * drives.len() as f64) as usize];
         let [x, y, yaw] = self.at(station, side, 3.0);
-        let (speed, way) = (rng.range(1.0, 2.0), rng.sign());
+        let (speed, sign) = (rng.range(1.0, 2.0), rng.sign());
         let begin = rng.range(-3.0, 0.6 * long_s);
         let state = State { x, y, yaw: yaw + side * FRAC_PI_2, speed: 0.0 };
         let path = Path::starting(begin, state).then(1.0, -speed, 0.0);
         let path = path.then(rng.range(2.0, 3.5) / speed, 0.0, 0.0);
-        let path = path.then(FRAC_PI_2 * 4.5 / speed, 0.0, way / 4.5);
+        let path = path.then(FRAC_PI_2 * 4.5 / speed, 0.0, sign / 4.5);
         path.then(1.0, speed, 0.0).then(1.0, 0.0, 0.0).then(2.5, 1.5, 0.0)
     }
 }

@@ -18,7 +18,7 @@ const LANE_M: f64 = 1.8;
 /// Half width of an arm, m.
 const ARM_M: f64 = 3.7;
 /// How much longer than a drive a path lasts, s.
-const ON_S: f64 = 20.0;
+const CONTINUATION_S: f64 = 20.0;
 
 pub(super) struct Roundabout {
     /// Radii of the mound, the middle of the ring and its outer edge, m.
@@ -250,7 +250,7 @@ impl Roundabout {
     /// Vehicles on the ring, arriving, leaving and waiting. All on the ring are as fast as the
     /// vehicle, so that none catches up with another.
     fn driving(&self, crowd: &mut Crowd, amount: f64, model: Model) {
-        let (speed, on_s) = (self.vehicle.1, crowd.duration_s + ON_S);
+        let (speed, on_s) = (self.vehicle.1, crowd.duration_s + CONTINUATION_S);
         crowd.add(0.5 * amount, model, |r, _| {
             self.circling(r.range(0.0, TAU), self.radii[1], speed, on_s)
         });
@@ -267,14 +267,14 @@ impl Roundabout {
 
     /// Along an arm, or across it.
     fn walking(&self, rng: &mut Rng, duration_s: f64) -> Path {
-        let (arm, speed, way) = (self.any_arm(rng), rng.range(0.8, 1.9), rng.sign());
+        let (arm, speed, sign) = (self.any_arm(rng), rng.range(0.8, 1.9), rng.sign());
         let gone = speed * rng.range(0.0, duration_s);
         let (out, left, yaw) = match rng.chance(0.5) {
-            true => (rng.range(25.0, 60.0) - way * gone, rng.sign() * (ARM_M + 2.0), 0.0),
-            false => (self.radii[2] + 5.5, -way * gone, FRAC_PI_2),
+            true => (rng.range(25.0, 60.0) - sign * gone, rng.sign() * (ARM_M + 2.0), 0.0),
+            false => (self.radii[2] + 5.5, -sign * gone, FRAC_PI_2),
         };
         let [x, y] = self.on_arm(arm, out, left);
-        let yaw = arm + yaw + if way < 0.0 { PI } else { 0.0 };
+        let yaw = arm + yaw + if sign < 0.0 { PI } else { 0.0 };
         Path::from(State { x, y, yaw, speed })
     }
 }
@@ -310,7 +310,7 @@ impl Layout for Roundabout {
         let kinds: [(f64, Model); 4] =
             [(1.0, models::bus), (5.0, models::car), (2.0, models::van), (1.0, models::motorcycle)];
         kinds.iter().for_each(|&(amount, model)| self.driving(crowd, amount, model));
-        let on_s = crowd.duration_s + ON_S;
+        let on_s = crowd.duration_s + CONTINUATION_S;
         crowd.add(6.0, models::cyclist, |r, _| {
             let (angle, away) = (r.range(0.0, TAU), self.radii[2] + r.range(1.4, 2.4));
             self.circling(angle, away, r.range(2.5, 5.0), on_s)

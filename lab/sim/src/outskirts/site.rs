@@ -1,6 +1,6 @@
 //! Places fixtures, except where the vehicle drives.
 
-use super::clearance::Way;
+use super::clearance::SweptArea;
 use crate::ground::Ground;
 use crate::object::{Class, Fixture, Surface};
 use crate::rng::Rng;
@@ -28,18 +28,18 @@ pub(super) struct Site<'a> {
     pub(super) rng: &'a mut Rng,
     pub(super) fixtures: Vec<Fixture>,
     /// The vehicle's path.
-    way: Way,
+    swept: SweptArea,
 }
 
 impl<'a> Site<'a> {
-    pub(super) fn new(ground: &'a Ground, rng: &'a mut Rng, way: Way) -> Site<'a> {
-        Site { ground, rng, fixtures: Vec::new(), way }
+    pub(super) fn new(ground: &'a Ground, rng: &'a mut Rng, swept: SweptArea) -> Site<'a> {
+        Site { ground, rng, fixtures: Vec::new(), swept }
     }
 
     /// Adds a fixture (`pose` is `street_from_shape`) unless it is in the vehicle's way.
     pub(super) fn fix(&mut self, class: Class, shape: Shape, pose: Pose, surface: Surface) {
         let fixture = Fixture { class, shape, pose, surface };
-        if !Way::under(&fixture, self.ground).meets(&self.way) {
+        if !SweptArea::under(&fixture, self.ground).meets(&self.swept) {
             self.fixtures.push(fixture);
         }
     }

@@ -19,14 +19,14 @@ fn scenes() -> impl Iterator<Item = (String, Scene, Path)> {
 }
 
 #[test]
-fn nobody_goes_through_anything() {
+fn no_object_passes_through_another() {
     for (name, scene, path) in scenes() {
         check_clear(&name, &scene, &scene.fixtures, Some((&path, VEHICLE)));
     }
 }
 
 #[test]
-fn there_is_something_to_see_and_it_moves() {
+fn scenes_have_fixtures_and_movers_in_view() {
     for (name, scene, path) in scenes() {
         let near = |at: DVec3, t: f64| {
             let here = path.at(t);

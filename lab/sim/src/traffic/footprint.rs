@@ -25,7 +25,7 @@ impl Footprint {
             let along = |i: u32| (f64::from(i) + 0.5) / count * length - 0.5 * length;
             (0..count as u32).map(|i| [state.x + c * along(i), state.y + s * along(i)]).collect()
         };
-        let steps = if path.is_still() { 1 } else { (duration_s / CHECK_S).ceil() as u32 + 1 };
+        let steps = if path.is_static() { 1 } else { (duration_s / CHECK_S).ceil() as u32 + 1 };
         let centres: Vec<Vec<[f64; 2]>> =
             (0..steps).map(|i| discs(f64::from(i) * CHECK_S)).collect();
         let radius = 0.5 * width + 0.15;
@@ -63,7 +63,7 @@ pub(super) fn obstacle(fixture: &Fixture) -> Option<Footprint> {
         _ => return None,
     };
     let at = fixture.pose.translation;
-    let place = Path::standing(at.x, at.y, fixture.pose.yaw_rad());
+    let place = Path::stationary(at.x, at.y, fixture.pose.yaw_rad());
     Some(Footprint::new(&place, length.max(width), length.min(width).max(0.1), 0.0))
 }
 
@@ -81,7 +81,7 @@ mod tests {
         let a = to(0.0, 0.0, 0.0);
         assert!(a.touches(&to(10.0, -10.0, std::f64::consts::FRAC_PI_2)), "at the same time");
         assert!(!a.touches(&to(10.0, -25.0, std::f64::consts::FRAC_PI_2)), "later");
-        let still = |x: f64, y: f64| Footprint::new(&Path::standing(x, y, 0.0), 0.2, 0.2, 0.0);
+        let still = |x: f64, y: f64| Footprint::new(&Path::stationary(x, y, 0.0), 0.2, 0.2, 0.0);
         assert!(a.touches(&still(20.0, 1.1)) && still(20.0, 1.1).touches(&a), "on the way");
         assert!(!a.touches(&still(20.0, 1.6)) && !a.touches(&still(40.0, 0.0)), "beside, beyond");
     }

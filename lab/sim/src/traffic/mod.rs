@@ -76,7 +76,7 @@ struct Fill<'a> {
 
 impl Fill<'_> {
     /// Adds the object if its path is clear.
-    fn offer(&mut self, model: Model, path: Path) -> bool {
+    fn try_add(&mut self, model: Model, path: Path) -> bool {
         let object = model(self.objects.len() as u32 + 1, path, self.rng);
         let footprint =
             Footprint::new(&object.path, object.size[0], object.size[1], self.duration_s);
@@ -96,14 +96,14 @@ impl Fill<'_> {
     fn mover(&mut self, model: Model, route: impl Fn(&mut Routes) -> Path) -> Option<Path> {
         (0..TRIES).find_map(|_| {
             let path = route(&mut self.routes());
-            self.offer(model, path.clone()).then_some(path)
+            self.try_add(model, path.clone()).then_some(path)
         })
     }
 
     /// Someone walking with another, half a metre to a metre to the side, if there is room.
     fn companion(&mut self, path: Path) {
         let beside = self.rng.sign() * self.rng.range(0.55, 1.0);
-        self.offer(models::pedestrian, path.moved(0.0, beside));
+        self.try_add(models::pedestrian, path.moved(0.0, beside));
     }
 
     /// One of [`DRIVERS`].
@@ -155,7 +155,7 @@ impl Fill<'_> {
                     16..19 => models::van,
                     _ => models::truck,
                 };
-                self.offer(model, Path::standing(at, y, yaw));
+                self.try_add(model, Path::stationary(at, y, yaw));
             }
         }
     }

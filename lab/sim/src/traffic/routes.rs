@@ -79,21 +79,21 @@ impl Routes<'_> {
     /// Straight along the main road, `beside` its centre line.
     pub(super) fn along(&mut self, beside: f64, slow: f64, fast: f64) -> Path {
         let (t, x) = self.meeting();
-        let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
-        Path::from(State { x: x - way * speed * t, ..lane(way, beside, speed) })
+        let (sign, speed) = (self.rng.sign(), self.rng.range(slow, fast));
+        Path::from(State { x: x - sign * speed * t, ..lane(sign, beside, speed) })
     }
 
     /// Brakes or accelerates, beginning around the time it meets the vehicle.
     fn changing(&mut self, [slow, fast]: [f64; 2]) -> Path {
         let (t, x) = self.meeting();
-        let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
+        let (sign, speed) = (self.rng.sign(), self.rng.range(slow, fast));
         let later = if self.rng.chance(0.6) {
             self.rng.range(0.0, 0.6 * speed)
         } else {
             self.rng.range(speed, fast + 1.0)
         };
         let rate = self.rng.range(1.0, 4.0);
-        let start = State { x: x - way * speed * t, ..lane(way, LANE, speed) };
+        let start = State { x: x - sign * speed * t, ..lane(sign, LANE, speed) };
         // Up to two seconds earlier, but not before the drive begins.
         let begin = (t - self.rng.range(0.0, 2.0)).max(0.0);
         let path = Path::from(start).then(begin, 0.0, 0.0);
@@ -104,38 +104,38 @@ impl Routes<'_> {
     pub(super) fn past(&mut self, slow: &Path) -> Path {
         let abreast = self.rng.range(0.0, self.duration_s);
         let other = slow.at(abreast);
-        let way = if other.yaw.cos() < 0.0 { -1.0 } else { 1.0 };
+        let sign = if other.yaw.cos() < 0.0 { -1.0 } else { 1.0 };
         let speed = (other.speed + self.rng.range(4.0, 8.0)).max(7.0);
         let aside = self.rng.range(2.8, 3.5);
         // It leaves the lane this far behind the other, and returns to it this far ahead.
         let (gap, change_s) = (self.rng.range(9.0, 14.0), self.rng.range(2.2, 3.5));
         let before = gap / (speed - other.speed) + change_s;
-        let start = State { x: other.x - way * speed * before, ..lane(way, LANE, speed) };
+        let start = State { x: other.x - sign * speed * before, ..lane(sign, LANE, speed) };
         let path = Path::starting(abreast - before, start).then_shift(aside, change_s);
         path.then(2.0 * gap / (speed - other.speed), 0.0, 0.0).then_shift(-aside, change_s)
     }
 
     /// From the main road into the right lane of the crossing road.
     fn turning(&mut self) -> Path {
-        let (way, speed) = (self.rng.sign(), self.rng.range(3.5, 6.5));
+        let (sign, speed) = (self.rng.sign(), self.rng.range(3.5, 6.5));
         let left = self.rng.chance(0.4);
         let (radius, angle) = if left { (11.0, FRAC_PI_2) } else { (8.0, -FRAC_PI_2) };
         let before = self.rng.range(0.0, self.duration_s.max(2.0));
-        let path = Path::from(lane(way, LANE, speed)).then(before, 0.0, 0.0);
+        let path = Path::from(lane(sign, LANE, speed)).then(before, 0.0, 0.0);
         let path = path.then_turn(angle, radius, EASE_S);
-        let right = self.plan.crossing + way * LANE.copysign(angle);
+        let right = self.plan.crossing + sign * LANE.copysign(angle);
         let x = right - path.end().x;
         path.moved(x, 0.0)
     }
 
     /// Along the crossing road.
     fn crossing(&mut self, beside: f64, slow: f64, fast: f64) -> Path {
-        let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
+        let (sign, speed) = (self.rng.sign(), self.rng.range(slow, fast));
         let t = self.rng.range(-2.0, self.duration_s + 2.0);
         let state = State {
-            x: self.plan.crossing + way * beside,
-            y: -way * speed * t,
-            yaw: way * FRAC_PI_2,
+            x: self.plan.crossing + sign * beside,
+            y: -sign * speed * t,
+            yaw: sign * FRAC_PI_2,
             speed,
         };
         Path::from(state)
@@ -144,32 +144,32 @@ impl Routes<'_> {
     /// On a sidewalk, standing there, or crossing the main road.
     pub(super) fn walker(&mut self) -> Path {
         let (t, x) = self.meeting();
-        let (way, side) = (self.rng.sign(), self.rng.sign());
+        let (sign, side) = (self.rng.sign(), self.rng.sign());
         let ([slow, fast], aside) = match self.plan.pace {
             Pace::Slow => ([0.4, 1.4], [0.8, 3.8]),
             _ => ([0.8, 2.0], [1.4, 3.2]),
         };
         let speed = self.rng.range(slow, fast);
         let y = side * (ROAD_HALF + self.rng.range(aside[0], aside[1]));
-        let yaw = if way > 0.0 { 0.0 } else { PI };
+        let yaw = if sign > 0.0 { 0.0 } else { PI };
         match (self.rng.unit() * 10.0) as u32 {
-            0 => Path::standing(x, y, self.rng.range(-PI, PI)),
+            0 => Path::stationary(x, y, self.rng.range(-PI, PI)),
             1..4 => {
                 let before = t * self.rng.unit();
-                let start = State { x: x - way * speed * before, y, yaw, speed };
+                let start = State { x: x - sign * speed * before, y, yaw, speed };
                 // A quarter turn left or right onto the road, back along the other sidewalk.
-                let quarter = -side * way * FRAC_PI_2;
+                let quarter = -side * sign * FRAC_PI_2;
                 let turn = |path: Path, angle| path.then_turn(angle, 0.8, WALKER_EASE_S);
                 let path = turn(Path::from(start).then(before, 0.0, 0.0), quarter);
                 let over = 2.0 * path.end().y.abs();
                 turn(path.then(over / speed, 0.0, 0.0), -quarter)
             }
-            _ => Path::from(State { x: x - way * speed * t, y, yaw, speed }),
+            _ => Path::from(State { x: x - sign * speed * t, y, yaw, speed }),
         }
     }
 }
 
 /// Start in a lane of the main road, heading along +x or -x, on the right-hand side.
-fn lane(way: f64, beside: f64, speed: f64) -> State {
-    State { x: 0.0, y: -way * beside, yaw: if way > 0.0 { 0.0 } else { PI }, speed }
+fn lane(sign: f64, beside: f64, speed: f64) -> State {
+    State { x: 0.0, y: -sign * beside, yaw: if sign > 0.0 { 0.0 } else { PI }, speed }
 }

@@ -15,7 +15,7 @@ use raywake::weight_files::WeightFiles;
 use raywake_io::Error;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use variants::{AUTHOR, BASE, Numbers, VARIANTS, Variant};
+use variants::{AUTHOR, BASE, ParameterSource, VARIANTS, Variant};
 
 /// `raywake-lab ablate`.
 #[derive(clap::Args)]
@@ -66,14 +66,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// The base with a variant's change applied.
 fn settings(variant: &Variant, base: &Settings) -> Result<Settings, Error> {
     let profile = variant.profile(&base.profile);
-    profile.check().map_err(|e| Error::Usage(format!("{} must be {}", e.field, e.must)))?;
+    profile.check().map_err(|e| Error::Usage(format!("{} must be {}", e.field, e.requirement)))?;
     let weights = match variant.numbers {
-        Numbers::Base => base.weights.clone(),
-        Numbers::NoFilter => base.weights.clone().without_filter(),
-        Numbers::NoEncoder => base.weights.clone().without_encoder(),
-        Numbers::Author => base.weights.clone().with_constancy(AUTHOR),
-        Numbers::AsPrinted => WeightFiles::read(&Learned::default(), &profile)?,
-        Numbers::AsPrintedAuthor => {
+        ParameterSource::Base => base.weights.clone(),
+        ParameterSource::NoFilter => base.weights.clone().without_filter(),
+        ParameterSource::NoEncoder => base.weights.clone().without_encoder(),
+        ParameterSource::Author => base.weights.clone().with_constancy(AUTHOR),
+        ParameterSource::AsPrinted => WeightFiles::read(&Learned::default(), &profile)?,
+        ParameterSource::AsPrintedAuthor => {
             WeightFiles::read(&Learned::default(), &profile)?.with_constancy(AUTHOR)
         }
     };

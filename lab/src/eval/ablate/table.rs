@@ -78,7 +78,7 @@ pub fn row(
     cells.extend(PARTS.map(|names| time(median(drives.iter().flat_map(|d| part(d, names))))));
     cells.push(Cell::Number(device_bytes(profile) as f64 / 1e6, 1));
     let moving = verdicts.all();
-    let shares = [moving.precision(), moving.recall(), moving.forgiven_precision()];
+    let shares = [moving.precision(), moving.recall(), moving.tolerant_precision()];
     cells.extend(shares.map(percent));
     let pairs: u64 = drives.iter().filter(|d| d.has_boxes()).map(|d| d.pairs).sum();
     cells.push(Cell::Number(moving.far() as f64 / pairs as f64, 2));

@@ -4,7 +4,7 @@ use raywake_core::params::{Frame, Profile};
 
 /// Source of a variant's learned parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Numbers {
+pub enum ParameterSource {
     /// Those of the base.
     Base,
     /// Those of the base, without a background filter.
@@ -31,7 +31,7 @@ pub struct Variant {
     pub what: &'static str,
     change: fn(Profile) -> Profile,
     /// Its learned parameters.
-    pub numbers: Numbers,
+    pub numbers: ParameterSource,
 }
 
 /// Name of the variant without a change.
@@ -45,12 +45,12 @@ impl Variant {
 
     /// Whether nothing is changed: in every series one variant equals the base.
     pub fn is_base(&self, base: &Profile) -> bool {
-        self.numbers == Numbers::Base && self.profile(base) == *base
+        self.numbers == ParameterSource::Base && self.profile(base) == *base
     }
 }
 
 const fn of(name: &'static str, what: &'static str, change: fn(Profile) -> Profile) -> Variant {
-    Variant { name, what, change, numbers: Numbers::Base }
+    Variant { name, what, change, numbers: ParameterSource::Base }
 }
 
 fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
@@ -73,20 +73,23 @@ pub const VARIANTS: [Variant; 26] = [
     of("rounds-6", "6 rounds", |p| Profile { em_rounds: 6, ..p }),
     of("rounds-20", "20 rounds", |p| Profile { em_rounds: 20, ..p }),
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
-    Variant { numbers: Numbers::NoFilter, ..of("filter-off", "every solid column", |p| p) },
-    Variant { numbers: Numbers::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
-    Variant { numbers: Numbers::Author, ..of("author-constancy", "the author's constants", |p| p) },
+    Variant { numbers: ParameterSource::NoFilter, ..of("filter-off", "every solid column", |p| p) },
+    Variant { numbers: ParameterSource::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
+    Variant {
+        numbers: ParameterSource::Author,
+        ..of("author-constancy", "the author's constants", |p| p)
+    },
     of("sensor-frame", "sensor frame, our constants, whole cells", |p| Profile {
         frame: Frame::Sensor,
         refinement_sweeps: 0,
         ..p
     }),
     Variant {
-        numbers: Numbers::AsPrinted,
+        numbers: ParameterSource::AsPrinted,
         ..of("dissertation", "chapter 3 as printed", |_| Profile::dissertation())
     },
     Variant {
-        numbers: Numbers::AsPrintedAuthor,
+        numbers: ParameterSource::AsPrintedAuthor,
         ..of("dissertation-author", "as printed, the author's constants", |_| {
             Profile::dissertation()
         })
@@ -127,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn the_authors_constants_have_his_range() {
+    fn the_authors_constants_are_in_his_range() {
         let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
         let scores = load(AUTHOR, 14, &mut weights, &mut costs).unwrap();
         // The range published with the constants: scores of -537 to 2052.
@@ -135,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn one_of_every_series_is_the_base() {
+    fn every_series_has_one_base() {
         let base = Profile::hdl64();
         for series in [BASE, "refine-", "smoothing-", "rounds-", "cells-"] {
             let same = VARIANTS.iter().filter(|v| v.name.starts_with(series) && v.is_base(&base));

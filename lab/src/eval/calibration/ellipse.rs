@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_covariance_holds_nothing() {
+    fn invalid_covariances_hold_nothing() {
         let none = [
             [0.0, 0.0, 0.0],
             [-1.0, 0.0, -1.0],

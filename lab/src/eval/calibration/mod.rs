@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_of_normal_errors_are_those_claimed() {
+    fn coverage_of_normal_errors_is_as_claimed() {
         let mut calibration = Calibration::default();
         (0..COUNT).for_each(|n| calibration.row(&row(n), true));
         let moving = Columns::Of(ClassGroup::Labelled, MotionGroup::Moving);

@@ -10,7 +10,7 @@ use crate::report::{Cell, Table, TableRow};
 
 /// Columns of one class and motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct PutOut {
+struct VerdictCounts {
     columns: u64,
     /// Reported as moving.
     moving: u64,
@@ -20,18 +20,18 @@ struct PutOut {
 
 /// Verdicts with one kind of truth.
 #[derive(Clone, Debug, Default)]
-struct OfTruth {
+struct TruthVerdicts {
     counts: MotionCounts,
     /// Including the ground below objects, as with boxes.
     by_boxes: MotionCounts,
     /// By class, then by [`Row::motion`].
-    kinds: [[PutOut; 3]; COUNT],
+    kinds: [[VerdictCounts; 3]; COUNT],
     wrong: FalseMotion,
 }
 
 /// Verdicts on the columns of drives with smoothed and with exact labels.
 #[derive(Clone, Debug, Default)]
-pub struct ColumnVerdicts([OfTruth; 2]);
+pub struct ColumnVerdicts([TruthVerdicts; 2]);
 
 impl ColumnVerdicts {
     /// Counts a row; `exact`: it is from a drive with exact labels.
@@ -40,21 +40,21 @@ impl ColumnVerdicts {
             return;
         }
         let of = &mut self.0[usize::from(exact)];
-        let put_out = row.is_put_out_moving();
+        let reported = row.is_reported_moving();
         if let Some(moves) = row.moves_by_boxes() {
-            of.by_boxes.add(moves, put_out, row.mover_m);
+            of.by_boxes.add(moves, reported, row.mover_m);
         }
         if row.below {
             return;
         }
         let kind = &mut of.kinds[row.class as usize][row.motion as usize];
         kind.columns += 1;
-        kind.moving += u64::from(put_out);
+        kind.moving += u64::from(reported);
         kind.by_flow += u64::from(row.is_moving_by_flow());
         let Some(moves) = row.moves() else { return };
-        of.counts.add(moves, put_out, row.mover_m);
+        of.counts.add(moves, reported, row.mover_m);
         if !moves {
-            of.wrong.standing(row, put_out);
+            of.wrong.add_static(row, reported);
         }
     }
 
@@ -75,8 +75,8 @@ impl ColumnVerdicts {
         self.0[usize::from(exact)].by_boxes
     }
 
-    fn of(&self, exact: bool, group: ClassGroup, motion: MotionGroup) -> PutOut {
-        let mut all = PutOut::default();
+    fn of(&self, exact: bool, group: ClassGroup, motion: MotionGroup) -> VerdictCounts {
+        let mut all = VerdictCounts::default();
         for (class, motion) in cells(group, motion) {
             let kind = self.0[usize::from(exact)].kinds[class][motion];
             all.columns += kind.columns;
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(verdicts.counts(true), found);
         assert_eq!(verdicts.counts_by_boxes(true), MotionCounts { missed: 2, ..found });
         let of = |group, motion| {
-            let PutOut { columns, moving, by_flow } = verdicts.of(true, group, motion);
+            let VerdictCounts { columns, moving, by_flow } = verdicts.of(true, group, motion);
             [columns, moving, by_flow]
         };
         assert_eq!(of(ClassGroup::Labelled, MotionGroup::Moving), [2, 1, 1]);

@@ -50,7 +50,7 @@ const ASPECTS: [Aspect; 6] = [
 
 /// Static columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Standing {
+struct StaticColumns {
     columns: u64,
     /// Reported as moving, by zone.
     wrong: [u64; 3],
@@ -58,15 +58,15 @@ struct Standing {
 
 /// Static columns, by aspect and bin.
 #[derive(Clone, Debug, Default)]
-pub struct FalseMotion([[Standing; CLASSES.len()]; ASPECTS.len()]);
+pub struct FalseMotion([[StaticColumns; CLASSES.len()]; ASPECTS.len()]);
 
 impl FalseMotion {
-    /// Counts a static column; `put_out`: it is reported as moving.
-    pub fn standing(&mut self, row: &Row, put_out: bool) {
+    /// Counts a static column; `reported`: it is reported as moving.
+    pub fn add_static(&mut self, row: &Row, reported: bool) {
         for (aspect, bins) in ASPECTS.iter().zip(&mut self.0) {
             let standing = &mut bins[(aspect.bin)(row)];
             standing.columns += 1;
-            standing.wrong[zone(row.mover_m)] += u64::from(put_out);
+            standing.wrong[zone(row.mover_m)] += u64::from(reported);
         }
     }
 
@@ -104,13 +104,13 @@ mod tests {
         let row = |x, age, voxels, basis| Row { x, age, voxels, basis, ..Row::default() };
         let rows = [row(9.9, 0, 1, 0), row(10.0, 3, 2, 2), row(45.0, 400, 14, 3)];
         for (row, mover_m) in rows.iter().zip([0.4, 1.0, f32::INFINITY]) {
-            counted.standing(&Row { mover_m, ..*row }, row.age > 0);
+            counted.add_static(&Row { mover_m, ..*row }, row.age > 0);
         }
         for (aspect, bins) in ASPECTS.iter().zip(&counted.0) {
             assert_eq!(bins.iter().map(|b| b.columns).sum::<u64>(), 3, "{}", aspect.name);
             assert!(bins[aspect.bins.len()..].iter().all(|b| b.columns == 0), "{}", aspect.name);
         }
-        assert_eq!(counted.0[0][0], Standing { columns: 3, wrong: [0, 1, 1] });
+        assert_eq!(counted.0[0][0], StaticColumns { columns: 3, wrong: [0, 1, 1] });
         let ranges: Vec<u64> = counted.0[2].iter().map(|b| b.columns).take(4).collect();
         assert_eq!(ranges, [1, 1, 0, 1]);
         let none = FalseMotion::default();

@@ -53,7 +53,7 @@ impl FirstSights {
         let glimpse = sight.glimpses.entry(row.sweep).or_default();
         (glimpse.stamp_s, glimpse.dt_s) = (row.stamp_s, f64::from(row.dt));
         glimpse.columns += 1;
-        glimpse.moving += u32::from(row.is_put_out_moving());
+        glimpse.moving += u32::from(row.is_reported_moving());
     }
 
     /// Median and 90 % quantile by class.

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 /// Up to this distance from a mover's box false motion is forgiven in one of the columns, m:
 /// labels, swinging limbs and columns on the border are no more precise.
-pub const FORGIVEN_M: f32 = 0.5;
+pub const TOLERANCE_M: f32 = 0.5;
 /// Up to this distance false motion counts as near a mover, m: dragged along by its cluster.
 pub const NEAR_M: f32 = 2.0;
 
@@ -28,7 +28,7 @@ const ZONES: [&str; 3] = ["within 0.5 m of a mover", "0.5 to 2 m", "farther"];
 
 /// The zone at this distance from the nearest mover's box, m.
 fn zone(mover_m: f32) -> usize {
-    [FORGIVEN_M, NEAR_M].iter().filter(|end| mover_m > **end).count()
+    [TOLERANCE_M, NEAR_M].iter().filter(|end| mover_m > **end).count()
 }
 
 /// Verdicts on columns or returns whose motion is known.
@@ -57,8 +57,8 @@ fn per_sweep(count: u64, sweeps: u64) -> Cell {
 
 impl MotionCounts {
     /// Counts one at this distance from the nearest mover's box, m.
-    pub fn add(&mut self, moves: bool, put_out: bool, mover_m: f32) {
-        match (moves, put_out) {
+    pub fn add(&mut self, moves: bool, reported: bool, mover_m: f32) {
+        match (moves, reported) {
             (true, true) => self.found += 1,
             (true, false) => self.missed += 1,
             (false, true) => self.wrong[zone(mover_m)] += 1,
@@ -78,8 +78,8 @@ impl MotionCounts {
         share(self.found, self.found + self.wrong.iter().sum::<u64>())
     }
 
-    /// The same, ignoring whatever lies within [`FORGIVEN_M`] of a mover.
-    pub fn forgiven_precision(&self) -> f64 {
+    /// The same, ignoring whatever lies within [`TOLERANCE_M`] of a mover.
+    pub fn tolerant_precision(&self) -> f64 {
         share(self.found, self.found + self.wrong[1] + self.wrong[2])
     }
 
@@ -102,7 +102,7 @@ impl MotionCounts {
             self.precision(),
             self.recall(),
             share(found, found + all_wrong + missed),
-            self.forgiven_precision(),
+            self.tolerant_precision(),
         ];
         let shares = shares.map(|v| Cell::Number(100.0 * v, 1));
         counts.into_iter().chain(shares).chain(wrong.map(|n| per_sweep(n, sweeps))).collect()
@@ -172,8 +172,8 @@ mod tests {
         let mut counts = MotionCounts::default();
         let cases = [(true, true, 0.0), (true, false, 0.0), (false, true, 0.5), (false, true, 1.9)];
         let more = [(true, true, 0.0), (false, true, f32::INFINITY), (false, false, 0.1)];
-        for (moves, put_out, mover_m) in cases.into_iter().chain(more) {
-            counts.add(moves, put_out, mover_m);
+        for (moves, reported, mover_m) in cases.into_iter().chain(more) {
+            counts.add(moves, reported, mover_m);
         }
         assert_eq!(counts, MotionCounts { found: 2, missed: 1, wrong: [1, 1, 1] });
         let mut twice = counts;

@@ -23,13 +23,13 @@ struct Bin {
 
 /// Columns in view with one kind of truth, except slow ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct OfTruth {
+struct TruthReliability {
     bins: [Bin; BINS],
     /// Sum of squared differences between P(moves) and the truth, 0 or 1.
     squares: f64,
 }
 
-impl OfTruth {
+impl TruthReliability {
     fn sums(&self, from: usize) -> (u64, u64) {
         let bins = self.bins[from..].iter();
         bins.fold((0, 0), |(columns, moving), b| (columns + b.columns, moving + b.moving))
@@ -38,7 +38,7 @@ impl OfTruth {
 
 /// P(moves) of the columns of drives with smoothed and with exact labels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MovesReliability([OfTruth; 2]);
+pub struct MovesReliability([TruthReliability; 2]);
 
 impl MovesReliability {
     /// Counts a row; `exact`: it is from a drive with exact labels.

@@ -45,10 +45,10 @@ impl ReturnVerdicts {
         seen: &PairData,
         present: &[Present],
         exact: Option<&[PointTruth]>,
-        put_out: &[bool],
+        reported: &[bool],
     ) -> Result<(), Error> {
         let next_from_world = seen.then.inverse();
-        for (n, (point, put_out)) in seen.first.points.iter().zip(put_out).enumerate() {
+        for (n, (point, reported)) in seen.first.points.iter().zip(reported).enumerate() {
             let at = DVec3::from_array(point.position.map(f64::from));
             if !at.is_finite() || !self.view.holds(at) {
                 continue;
@@ -61,14 +61,14 @@ impl ReturnVerdicts {
             let stays = |by| self.view.holds((next_from_world * by).transform(at));
             let Some(moves) = moves(object).filter(|_| there.is_some_and(stays)) else { continue };
             // The distance matters only for false motion.
-            let mover_m = if *put_out { Present::mover_m(present, at) } else { 0.0 };
-            self.counts.in_boxes.add(moves, *put_out, mover_m);
+            let mover_m = if *reported { Present::mover_m(present, at) } else { 0.0 };
+            self.counts.in_boxes.add(moves, *reported, mover_m);
         }
         let Some(semantic) = &self.semantic else { return Ok(()) };
-        for (label, put_out) in semantic.returns(&seen.first)?.iter().zip(put_out) {
+        for (label, reported) in semantic.returns(&seen.first)?.iter().zip(reported) {
             let [all, moving] = self.counts.classes.entry(label.class).or_default();
             *all += 1;
-            *moving += u64::from(*put_out);
+            *moving += u64::from(*reported);
         }
         Ok(())
     }
@@ -110,11 +110,11 @@ struct ClassSums {
 
 impl ClassSums {
     fn add(&mut self, of_drive: &BTreeMap<u16, [u64; 2]>) {
-        let drive_tells = of_drive.keys().any(|class| label(*class).moving());
+        let has_motion_labels = of_drive.keys().any(|class| label(*class).moving());
         for (&class, counts) in of_drive {
             let add = |sum: &mut [u64; 2]| sum.iter_mut().zip(counts).for_each(|(s, n)| *s += n);
             add(self.classes.entry(class).or_default());
-            if let Some(moves) = class_moves(label(class), drive_tells) {
+            if let Some(moves) = class_moves(label(class), has_motion_labels) {
                 add(&mut self.of_motion[usize::from(moves)]);
             }
         }
@@ -138,9 +138,9 @@ fn label(class: u16) -> PointLabel {
 
 /// Whether the returns of a class move; `None` if unknown. If a drive's moving objects have no
 /// classes of their own, nothing is known about objects that could move.
-fn class_moves(label: PointLabel, drive_tells: bool) -> Option<bool> {
-    let told = drive_tells || label.kind().is_none();
-    (told && !label.is_unlabelled()).then_some(label.moving())
+fn class_moves(label: PointLabel, has_motion_labels: bool) -> Option<bool> {
+    let known = has_motion_labels || label.kind().is_none();
+    (known && !label.is_unlabelled()).then_some(label.moving())
 }
 
 /// False motion by SemanticKITTI's classes; `None` if no drive has any.
@@ -176,14 +176,14 @@ mod tests {
     }
 
     #[test]
-    fn classes_of_a_drive_that_tells_what_moves_and_of_one_that_does_not() {
+    fn classes_with_and_without_motion_labels() {
         assert!(semantic_kitti([drive(&[])].iter()).is_none());
         let merged = drive(&[(0, [90, 9]), (10, [50, 20]), (40, [200, 3]), (50, [100, 1])]);
         let table = semantic_kitti([&merged].into_iter()).unwrap();
         assert_eq!(table.rows.len(), 5);
         assert!(format!("{:?}", table.rows[4]).contains("Count(300), Count(4)"));
-        let told = drive(&[(1, [7, 7]), (10, [50, 2]), (252, [40, 30])]);
-        let both = semantic_kitti([merged, told].iter()).unwrap();
+        let known = drive(&[(1, [7, 7]), (10, [50, 2]), (252, [40, 30])]);
+        let both = semantic_kitti([merged, known].iter()).unwrap();
         assert!(format!("{:?}", both.rows[6]).contains("Count(350), Count(6)"), "{both:?}");
         assert!(format!("{:?}", both.rows[7]).contains("Count(40), Count(30)"), "{both:?}");
         // 30 of 40 that move and 6 static ones.

@@ -45,7 +45,7 @@ fn movers_are_found_and_little_else() {
 
 #[test]
 #[ignore = "needs RAYWAKE_DATA"]
-fn what_stands_is_put_out_so() {
+fn static_structure_is_reported_static() {
     let scratch = Scratch::new();
     let out = evaluated(&scratch, "kitti_odometry_00", &["--deskew", "off"]);
     let share = |class: &str| figure(&out, "semantic-kitti", &[class], "Reported as moving, %");

@@ -211,7 +211,7 @@ fn wrong_estimates() {
     let mut log = t.open().unwrap();
     let pair = log.pair(0).unwrap();
     let estimate = read_estimate(&t.0.path().join(ESTIMATE), &pair).unwrap();
-    assert_eq!(estimate.unvouched(&pair, &Rules::OFFICIAL), 2);
+    assert_eq!(estimate.marked_invalid(&pair, &Rules::OFFICIAL), 2);
 }
 
 #[test]

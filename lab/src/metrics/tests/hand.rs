@@ -77,7 +77,7 @@ fn three_way() {
 }
 
 #[test]
-fn nothing_and_nothing_that_moves() {
+fn nothing_at_all_and_nothing_moving() {
     let empty = BucketedEpe::default().errors(Range::Near);
     assert!(empty.mean_static_epe_m.is_nan() && empty.mean_dynamic.is_nan());
     assert!(ThreeWayEpe::default().errors(Range::Near).mean_epe_m().is_nan());
@@ -85,7 +85,7 @@ fn nothing_and_nothing_that_moves() {
     assert!(nothing.count == 0 && nothing.epe_m.is_nan() && nothing.strict.is_nan());
     let pair = still(vec![point("BUS", [0.0; 3]), point("BACKGROUND", [0.0; 3])]);
     let mut grades = Grades::default();
-    grades.add(&pair, &reference::standing(&pair), &Rules::OFFICIAL).unwrap();
+    grades.add(&pair, &reference::zero_motion(&pair), &Rules::OFFICIAL).unwrap();
     let errors = grades.bucketed.errors(Range::Near);
     assert_eq!(errors.mean_static_epe_m, 0.0);
     assert!(errors.mean_dynamic.is_nan());
@@ -168,9 +168,9 @@ fn what_cannot_be_scored() {
 }
 
 #[test]
-fn merging_is_adding() {
+fn merging_equals_adding() {
     let (pair, estimates) = street();
-    let zero = reference::standing(&pair);
+    let zero = reference::zero_motion(&pair);
     let (mut both, mut first, mut second) =
         (Grades::default(), Grades::default(), Grades::default());
     both.add(&pair, &estimates, &Rules::OFFICIAL).unwrap();

@@ -37,7 +37,7 @@ fn estimate(name: &str, pair: &Pair) -> Vec<[f32; 3]> {
         [x + offset(i, 7, 3.0), y + offset(i, 11, 5.0), z + offset(i, 5, 2.0)]
     };
     match name {
-        "zero" => reference::standing(pair),
+        "zero" => reference::zero_motion(pair),
         "rounded" => reference::rounded(pair, 0.3),
         "pattern" => pair.points.iter().enumerate().map(pattern).collect(),
         "carried" => reference::carried(pair),

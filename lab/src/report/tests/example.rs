@@ -198,7 +198,7 @@ pub fn table() -> Table {
 }
 
 /// A street of synthetic returns with one labelled car.
-pub fn panel(title: &str, way: [f64; 2]) -> Panel {
+pub fn panel(title: &str, vector: [f64; 2]) -> Panel {
     let ring = |r: i32| {
         (0..720).map(move |i| {
             let a = (f64::from(i) * 0.5).to_radians();
@@ -212,7 +212,7 @@ pub fn panel(title: &str, way: [f64; 2]) -> Panel {
         at: side(i),
         error: Some(0.02 * i as f64),
         truth: Some([1.4, 0.1]),
-        estimate: Some([way[0] + 0.01 * i as f64, way[1]]),
+        estimate: Some([vector[0] + 0.01 * i as f64, vector[1]]),
     };
     Panel {
         title: title.into(),

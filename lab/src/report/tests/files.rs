@@ -135,7 +135,7 @@ fn charts_hold_their_numbers() {
 }
 
 #[test]
-fn nothing_is_called_nothing() {
+fn empty_charts_say_no_data() {
     let (svg, _) = example::nothing().svg();
     assert_eq!(svg.matches("no data").count(), 4);
     let (svg, _) = Chart::small_multiples("none", "", vec![]).svg();
@@ -191,7 +191,7 @@ fn odd_values_are_drawn_or_left_out() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_by_name() {
+fn misfits_are_refused_by_name() {
     let folder = Scratch::new();
     let refused = |fill: &dyn Fn(&mut Section)| {
         let mut report = Report::new("t", "");

@@ -50,7 +50,7 @@ fn training_and_test_apart() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_are_named() {
     let [images, labels] = files(100);
     let cases: [(&str, Vec<u8>, Vec<u8>); 6] = [
         ("99 labels", images.clone(), files(99)[1].clone()),

@@ -16,14 +16,14 @@ mod tests;
 use super::inputs::{Inputs, Visit};
 use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file::text;
-use crate::curve::{Curve, Operating};
+use crate::curve::{Curve, OperatingPoint};
 use network::Network;
 use optimiser::{Optimiser, Schedule};
 use parameters::Parameters;
 use raywake_core::digest::Digest;
 use raywake_core::encoder::layers::*;
 use raywake_core::encoder::{ColumnClass, Encoder, EncoderWeights, class_of};
-use raywake_core::team::Alone;
+use raywake_core::team::SingleThread;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
 use raywake_sim::Rng;
@@ -65,7 +65,7 @@ struct Report {
     /// Mean loss of every hundred steps.
     losses: Vec<f64>,
     auc: f64,
-    curve: Vec<Operating>,
+    curve: Vec<OperatingPoint>,
     /// Share of the columns of a class (row) that are classified as another (column).
     confusion: Vec<Vec<f64>>,
 }
@@ -228,7 +228,7 @@ fn judge(
     let (mut rows, mut confusion) = (Vec::new(), vec![vec![0.0; 8]; 8]);
     for sample in samples {
         encoder.keep(&sample.columns(), sample.side, sample.corner);
-        encoder.encode(&Alone);
+        encoder.encode(&SingleThread);
         for (scores, &label) in encoder.scores().iter().zip(&sample.labels) {
             if label != UNKNOWN {
                 rows.push((f64::from(scores[SCORES - 1]), could_move(label), 1.0));

@@ -15,7 +15,7 @@ use raywake_sim::{Class, Rng};
 /// Nothing is known of the column, or it is not solid.
 pub const UNKNOWN: u8 = 255;
 /// The column cannot move, and its class is not labelled.
-pub const STAYS: u8 = 8;
+pub const IMMOVABLE: u8 = 8;
 
 /// A window of one sweep.
 #[derive(Clone)]
@@ -24,13 +24,13 @@ pub struct Sample {
     /// First column of the window, in columns of the world.
     pub corner: [i32; 2],
     pub masks: Vec<u32>,
-    /// [`ColumnClass`] of each column, [`STAYS`] or [`UNKNOWN`].
+    /// [`ColumnClass`] of each column, [`IMMOVABLE`] or [`UNKNOWN`].
     pub labels: Vec<u8>,
 }
 
 /// Whether a label is of something that could move.
 pub fn could_move(label: u8) -> bool {
-    (ColumnClass::Car as u8..STAYS).contains(&label)
+    (ColumnClass::Car as u8..IMMOVABLE).contains(&label)
 }
 
 /// The samples of a drive.
@@ -49,14 +49,14 @@ pub fn sample(grid: &mut Grid, drive: &dyn Labelled, sweep: &LabelledSweep) -> S
     // Returns of static structure, by class.
     let mut hits = vec![[0u16; 4]; grid.columns.len()];
     for (&column, &class) in grid.of_point.iter().zip(&sweep.class_of_point) {
-        if let (true, Some(class)) = (column != NONE, standing(class)) {
+        if let (true, Some(class)) = (column != NONE, static_class(class)) {
             hits[column as usize][class as usize] += 1;
         }
     }
     let mut labels = vec![UNKNOWN; grid.columns.len()];
     for (column, owner) in owners(grid, &window, drive, sweep) {
         labels[column] = match owner {
-            Owner::Object(n) => moving(sweep.objects[n].kind).map_or(UNKNOWN, |c| c as u8),
+            Owner::Object(n) => mover_class(sweep.objects[n].kind).map_or(UNKNOWN, |c| c as u8),
             Owner::Unknown => UNKNOWN,
             Owner::Background => most(&hits[column]),
         };
@@ -75,11 +75,11 @@ fn most(hits: &[u16; 4]) -> u8 {
     match above {
         Some(class) => class as u8,
         None if hits[0] > 0 => ColumnClass::Ground as u8,
-        None => STAYS,
+        None => IMMOVABLE,
     }
 }
 
-fn standing(class: Class) -> Option<ColumnClass> {
+fn static_class(class: Class) -> Option<ColumnClass> {
     match class {
         Class::Ground => Some(ColumnClass::Ground),
         Class::Building | Class::Fixture => Some(ColumnClass::Structure),
@@ -89,7 +89,7 @@ fn standing(class: Class) -> Option<ColumnClass> {
     }
 }
 
-fn moving(kind: Kind) -> Option<ColumnClass> {
+fn mover_class(kind: Kind) -> Option<ColumnClass> {
     match kind {
         Kind::Car | Kind::Van => Some(ColumnClass::Car),
         Kind::Truck | Kind::Bus | Kind::Tram => Some(ColumnClass::LargeVehicle),

@@ -85,7 +85,7 @@ fn rounded_it_is_core_s_bit_for_bit() {
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
     encoder.set_weights(Some(&weights));
     encoder.keep(&sample.columns(), sample.side, sample.corner);
-    encoder.encode(&Alone);
+    encoder.encode(&SingleThread);
     let asked = (0..sample.labels.len()).filter(|c| sample.labels[*c] != UNKNOWN);
     let mut kinds = std::collections::BTreeSet::new();
     for (column, scores) in asked.zip(tape.scores()) {
@@ -97,7 +97,7 @@ fn rounded_it_is_core_s_bit_for_bit() {
 }
 
 #[test]
-fn one_window_can_be_learned_by_heart_and_interrupted() {
+fn training_overfits_one_window_and_can_be_interrupted() {
     let scratch = Scratch::new();
     let samples = [few(&street(), 40)];
     let file = scratch.path().join("checkpoint");

@@ -24,8 +24,8 @@ use super::observation::Observation;
 use super::params::{EstimateParams, FixedLagParams};
 use super::problem::{Problem, StatePrior};
 use super::report::EstimateReport;
-use super::samples::{Sample, is_sound_return};
-use super::state::{ControlPoint, is_sound, state_at};
+use super::samples::{Sample, is_valid_return};
+use super::state::{ControlPoint, is_valid, state_at};
 use crate::spline::{DEGREE, Knots};
 use crate::{ObjectReturn, ObjectState};
 use heapless::Vec;
@@ -141,7 +141,7 @@ impl FixedLag {
     ) -> ObjectState {
         self.iterations = 0;
         self.remember(baseline);
-        let times = returns.iter().filter(|one| is_sound_return(one)).map(|one| one.time_s);
+        let times = returns.iter().filter(|one| is_valid_return(one)).map(|one| one.time_s);
         let Some(newest) = times.max_by(f32::total_cmp).map(f64::from) else {
             return if self.begun { self.state(baseline.time_s) } else { *baseline };
         };
@@ -188,7 +188,7 @@ impl FixedLag {
 
     /// Adds a state of the tracker to the history.
     fn remember(&mut self, baseline: &ObjectState) {
-        if !is_sound(baseline) {
+        if !is_valid(baseline) {
             return;
         }
         let mut state = *baseline;
@@ -208,7 +208,7 @@ impl FixedLag {
         baseline: &ObjectState,
         params: &FixedLagParams,
     ) -> usize {
-        let sound = || returns.iter().filter(|one| is_sound_return(one));
+        let sound = || returns.iter().filter(|one| is_valid_return(one));
         let oldest = self.newest_s - WINDOW_S;
         let count = sound().count();
         let keep = count.min(PER_SWEEP);
@@ -237,7 +237,7 @@ impl FixedLag {
             cos * x + sin * y - state.speed * f64::from(one.time_s)
         };
         [1.0, -1.0].map(|forward| {
-            let ranked = returns.iter().filter(|one| is_sound_return(one)).enumerate();
+            let ranked = returns.iter().filter(|one| is_valid_return(one)).enumerate();
             ranked
                 .max_by(|(_, a), (_, b)| (forward * along(a)).total_cmp(&(forward * along(b))))
                 .map(|(rank, _)| rank)
@@ -259,17 +259,17 @@ impl FixedLag {
 
     /// Whether the estimate is farther than `distance_m` from the tracker's.
     fn strayed(&self, state: &ObjectState, distance_m: f64) -> bool {
-        let Some(baseline) = self.history.last() else { return !is_sound(state) };
+        let Some(baseline) = self.history.last() else { return !is_valid(state) };
         let ahead = state.time_s - baseline.time_s;
         let (sin, cos) = libm::sincos(baseline.heading);
-        let way = baseline.speed * ahead;
+        let travelled = baseline.speed * ahead;
         let off = [
-            state.position[0] - baseline.position[0] - way * cos,
-            state.position[1] - baseline.position[1] - way * sin,
+            state.position[0] - baseline.position[0] - travelled * cos,
+            state.position[1] - baseline.position[1] - travelled * sin,
             state.position[2] - baseline.position[2],
         ];
         let square: f64 = off.iter().map(|v| v * v).sum();
-        !is_sound(state) || square > distance_m * distance_m
+        !is_valid(state) || square > distance_m * distance_m
     }
 
     fn state(&self, time_s: f64) -> ObjectState {

@@ -41,7 +41,7 @@ fn streamed(estimator: &mut Estimator, drive: &Drive, without: usize) -> Errors 
 }
 
 #[test]
-fn a_window_follows_sweep_by_sweep() {
+fn the_window_follows_sweep_by_sweep() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for seed in [1, 4] {
         let parked = drive(synthetic::parked(seed));
@@ -57,7 +57,7 @@ fn a_window_follows_sweep_by_sweep() {
 
 /// Holds from the first sweep on, in which many objects may appear at once.
 #[test]
-fn the_work_of_a_sweep_is_bounded() {
+fn work_per_sweep_is_bounded() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for plan in [synthetic::parked(1), synthetic::moving(2), synthetic::tram(1, 7.0)] {
         let drive = drive(plan);
@@ -73,7 +73,7 @@ fn the_work_of_a_sweep_is_bounded() {
 
 /// One end of it comes into view while the middle of the visible part hardly moves.
 #[test]
-fn a_window_finds_out_that_a_long_side_moves() {
+fn the_window_reveals_that_a_long_side_moves() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for (seed, speed) in [(1, 5.0), (2, 7.0), (3, 9.0)] {
         let drive = drive(synthetic::tram(seed, speed));
@@ -106,7 +106,7 @@ fn a_window_survives_bad_input() {
             &returns,
             &ObjectState { time_s, ..Default::default() },
         );
-        assert!(is_sound(&state), "{state:?}");
+        assert!(is_valid(&state), "{state:?}");
         state
     };
     // Nothing, one return, many, very many, nothing again.

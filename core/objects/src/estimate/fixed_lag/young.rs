@@ -62,8 +62,8 @@ impl FixedLag {
     fn start(&self, guess: Guess, problem: &mut Problem, params: &EstimateParams) {
         match guess {
             Guess::Rest => {
-                if !problem.stand(&self.history) {
-                    problem.stand_at_mean();
+                if !problem.rest_at_history_mean(&self.history) {
+                    problem.rest_at_mean();
                 }
                 if let Some(last) = self.published.last() {
                     let control_points = &mut problem.solution.control_points[..BASES];

@@ -4,7 +4,7 @@ mod objects;
 
 extern crate std;
 use super::association::velocity_distance2;
-use super::scene::{PARAMS, Run, Thing, ground, rig, seen};
+use super::scene::{PARAMS, Run, SceneBox, ground, rig, seen};
 use super::*;
 use crate::centroid_ekf::CentroidEkf;
 use glam::DVec3;
@@ -16,7 +16,7 @@ use std::vec::Vec;
 
 #[test]
 fn cars_are_followed_far_from_the_origin() {
-    let things = [Thing::car(10.0, 4.0, [8.0, 0.0]), Thing::car(30.0, -4.0, [-8.0, 0.0])];
+    let things = [SceneBox::car(10.0, 4.0, [8.0, 0.0]), SceneBox::car(30.0, -4.0, [-8.0, 0.0])];
     let mut run = Run::new(1, 8);
     // The world's origin is thousands of kilometres away.
     run.place = Pose::planar(4e5, 5e6, 300.0, 0.0);
@@ -32,7 +32,7 @@ fn cars_are_followed_far_from_the_origin() {
         let thing = things
             .iter()
             .min_by(|a, b| {
-                let off = |t: &Thing| (4e5 + t.at[0] - track.anchor[0]).abs();
+                let off = |t: &SceneBox| (4e5 + t.at[0] - track.anchor[0]).abs();
                 off(a).total_cmp(&off(b))
             })
             .unwrap();
@@ -62,7 +62,7 @@ fn cars_are_followed_far_from_the_origin() {
 /// Two sensors that see the same car half a revolution apart, as one sweep or as two.
 #[test]
 fn sensors_need_not_be_in_step() {
-    let things = [Thing::car(12.0, 3.0, [15.0, 0.0])];
+    let things = [SceneBox::car(12.0, 3.0, [15.0, 0.0])];
     for apart in [false, true] {
         let mut run = Run::new(2, 8);
         for n in 0..15 {
@@ -98,8 +98,8 @@ fn sensors_need_not_be_in_step() {
 }
 
 #[test]
-fn a_moving_vehicle_sees_what_stands_standing() {
-    let things = [Thing::car(25.0, 4.0, [0.0, 0.0])];
+fn static_structure_is_static_for_a_moving_vehicle() {
+    let things = [SceneBox::car(25.0, 4.0, [0.0, 0.0])];
     let mut run = Run::new(1, 8);
     run.rig = rig(1, Timing::Azimuth { span_s: 0.1 });
     run.rig.distorted = true;
@@ -139,9 +139,9 @@ fn a_moving_vehicle_sees_what_stands_standing() {
 
 #[test]
 fn walls_and_crumbs_are_no_objects() {
-    let wall = Thing { at: [10.0, 10.0], size: [30.0, 0.4, 3.0], velocity: [0.0; 2] };
-    let crumb = Thing { at: [5.0, -5.0], size: [0.1, 0.1, 1.6], velocity: [0.0; 2] };
-    let kerb = Thing { at: [5.0, -9.0], size: [10.0, 0.4, 0.2], velocity: [0.0; 2] };
+    let wall = SceneBox { at: [10.0, 10.0], size: [30.0, 0.4, 3.0], velocity: [0.0; 2] };
+    let crumb = SceneBox { at: [5.0, -5.0], size: [0.1, 0.1, 1.6], velocity: [0.0; 2] };
+    let kerb = SceneBox { at: [5.0, -9.0], size: [10.0, 0.4, 0.2], velocity: [0.0; 2] };
     let mut run = Run::new(1, 8);
     let counts = run.see(&[wall, crumb, kerb], 0.0);
     assert_eq!((counts.too_large, counts.too_small, counts.segments), (1, 1, 0));
@@ -149,7 +149,7 @@ fn walls_and_crumbs_are_no_objects() {
 }
 
 #[test]
-fn a_map_of_the_ground_serves_where_none_is_seen() {
+fn ground_map_is_used_where_no_ground_is_seen() {
     // A slope that the returns do not show, and a flat table standing on it.
     let height = |x: f64| 0.3 * x;
     let heights: Vec<f32> =
@@ -177,9 +177,9 @@ fn a_map_of_the_ground_serves_where_none_is_seen() {
 
 /// A person who passes a parked car within arm's length.
 #[test]
-fn the_flow_tells_neighbours_apart() {
-    let car = Thing::car(12.0, 5.0, [0.0; 2]);
-    let person = Thing { at: [8.0, 3.7], size: [0.4, 0.4, 1.7], velocity: [1.5, 0.0] };
+fn flow_separates_neighbours() {
+    let car = SceneBox::car(12.0, 5.0, [0.0; 2]);
+    let person = SceneBox { at: [8.0, 3.7], size: [0.4, 0.4, 1.7], velocity: [1.5, 0.0] };
     let speeds = |of_person: [f32; 2]| {
         let mut run = Run::new(1, 8);
         let (mut born, mut flows) = (0, Vec::new());
@@ -222,9 +222,9 @@ fn velocities_join_the_gate() {
 }
 
 #[test]
-fn beyond_a_capacity_all_is_counted() {
-    let things: Vec<Thing> = (0..196)
-        .map(|n| Thing {
+fn everything_beyond_a_capacity_is_counted() {
+    let things: Vec<SceneBox> = (0..196)
+        .map(|n| SceneBox {
             at: [(n % 14) as f64 * 5.5 - 38.0, (n / 14) as f64 * 5.5 - 38.0],
             size: [0.6, 0.6, 1.6],
             velocity: [0.0; 2],
@@ -269,13 +269,13 @@ fn chunks_and_segments_beyond_their_capacity() {
     assert_eq!(counts.segments, SEGMENTS_MAX as u64);
     assert!(counts.unlisted > 0 && counts.born == 8, "{counts:?}");
     // The next batch is unaffected.
-    let counts = run.see(&[Thing::car(10.0, 0.0, [0.0; 2])], 0.1);
+    let counts = run.see(&[SceneBox::car(10.0, 0.0, [0.0; 2])], 0.1);
     assert_eq!((counts.unchunked, counts.segments), (0, 1));
 }
 
 #[test]
-fn what_is_not_finite_leaves_no_trace() {
-    let things = [Thing::car(10.0, 4.0, [5.0, 0.0])];
+fn non_finite_input_leaves_no_trace() {
+    let things = [SceneBox::car(10.0, 4.0, [5.0, 0.0])];
     let (mut clean, mut soiled) = (Run::new(1, 8), Run::new(1, 8));
     for n in 0..10 {
         let stamp_s = n as f64 * 0.1;
@@ -306,7 +306,7 @@ fn what_is_not_finite_leaves_no_trace() {
 
 #[test]
 fn unseen_tracks_wait_then_end() {
-    let car = [Thing::car(10.0, 4.0, [5.0, 0.0])];
+    let car = [SceneBox::car(10.0, 4.0, [5.0, 0.0])];
     let mut run = Run::new(1, 8);
     // Seen only once, it does not wait.
     run.see(&car, 0.0);
@@ -328,16 +328,16 @@ fn unseen_tracks_wait_then_end() {
     let counts = run.see(&[], 1.7);
     assert_eq!((counts.waiting, counts.ended), (0, 1));
     // It can be read until the next step.
-    let ended: Vec<&Track> = run.tracks.iter().filter(|t| t.life == Life::Ended).collect();
+    let ended: Vec<&Track> = run.tracks.iter().filter(|t| t.status == TrackStatus::Ended).collect();
     assert_eq!((ended.len(), ended[0].observations), (1, 9));
     assert!((ended[0].last_s() - 1.1).abs() < 1e-6);
     run.see(&[], 1.8);
-    assert!(run.tracks.iter().all(|t| t.life == Life::Free && t.returns().is_empty()));
+    assert!(run.tracks.iter().all(|t| t.status == TrackStatus::Free && t.returns().is_empty()));
 }
 
 #[test]
-fn gaps_and_time_that_runs_back_end_all_tracks() {
-    let car = [Thing::car(10.0, 4.0, [0.0, 0.0])];
+fn gaps_and_backward_time_end_all_tracks() {
+    let car = [SceneBox::car(10.0, 4.0, [0.0, 0.0])];
     for (next_s, reset) in [(3.0, 0), (0.2, 1), (-5.0, 1)] {
         let mut run = Run::new(1, 8);
         for n in 0..5 {

@@ -1,7 +1,7 @@
 //! Which tracks are reported as objects.
 
 extern crate std;
-use super::super::scene::{PARAMS, Run, Thing, ground, seen};
+use super::super::scene::{PARAMS, Run, SceneBox, ground, seen};
 use super::super::*;
 use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{ColumnFlow, PointFlows, ReturnFlow, Status};
@@ -10,10 +10,10 @@ use std::vec::Vec;
 
 /// A wall, a parked car, a walking person, and a wall that the flow reports as moving for a while.
 #[test]
-fn objects_are_what_moves_and_what_could() {
-    let wall = |y| Thing { at: [5.0, y], size: [6.0, 0.4, 2.0], velocity: [0.0; 2] };
-    let person = Thing { at: [8.0, 3.7], size: [0.4, 0.4, 1.7], velocity: [1.5, 0.0] };
-    let things = [wall(12.0), Thing::car(12.0, -6.0, [0.0; 2]), person, wall(-12.0)];
+fn objects_are_movers_and_potential_movers() {
+    let wall = |y| SceneBox { at: [5.0, y], size: [6.0, 0.4, 2.0], velocity: [0.0; 2] };
+    let person = SceneBox { at: [8.0, 3.7], size: [0.4, 0.4, 1.7], velocity: [1.5, 0.0] };
+    let things = [wall(12.0), SceneBox::car(12.0, -6.0, [0.0; 2]), person, wall(-12.0)];
     let (structure, car) = (Some(ColumnClass::Structure), Some(ColumnClass::Car));
     let classes = [structure, car, None, structure];
     let run = |encoder: bool, flow: bool| {

@@ -49,7 +49,7 @@ impl LiveServer {
     }
 
     /// Whether a viewer has subscribed to a topic.
-    pub fn is_watched(&self) -> bool {
+    pub fn has_viewer(&self) -> bool {
         self.channels.iter().any(|channel| channel.has_sinks())
     }
 

@@ -14,11 +14,11 @@ pub(super) use NoServer as LiveServer;
 impl NoServer {
     /// Fails with [`Error::Unsupported`].
     pub fn start(_: SocketAddr, _: Pace, _: &[Topic]) -> Result<NoServer, Error> {
-        Err(Error::lacking("--live", "live"))
+        Err(Error::missing_feature("--live", "live"))
     }
 
     /// Never called.
-    pub fn is_watched(&self) -> bool {
+    pub fn has_viewer(&self) -> bool {
         match *self {}
     }
 

@@ -3,7 +3,7 @@
 use raywake_objects::tracked::TrackedObject;
 
 use super::cdr::Cdr;
-use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
+use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STATIONARY, VEHICLE, WORLD};
 
 /// `CUBE` and `LINE_LIST` of the message.
 const CUBE: u32 = 1;
@@ -17,12 +17,12 @@ pub(super) fn cube(stamp_ns: u64, object: &TrackedObject) -> Vec<u8> {
     [object.id, CUBE, 0].into_iter().for_each(|n| cdr.word(n));
     cdr.planar(object.centre, object.heading);
     cdr.doubles(object.size.map(|v| f64::from(v).max(LINE_M)));
-    let colour = if object.velocity.is_some() { MOVING } else { STANDING };
+    let colour = if object.velocity.is_some() { MOVING } else { STATIONARY };
     colour.into_iter().for_each(|v| cdr.float(v));
     [0, BOX_SHOWN_NS].into_iter().for_each(|n| cdr.word(n));
     cdr.byte(0);
     cdr.word(0);
-    without_looks(&mut cdr);
+    end_marker(&mut cdr);
     cdr.message()
 }
 
@@ -44,12 +44,12 @@ pub(super) fn lines(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
         let ends = [[*x, *y], [x + AHEAD_S * u, y + AHEAD_S * v]];
         ends.into_iter().for_each(|[x, y]| cdr.doubles([x.into(), y.into(), 0.0]));
     }
-    without_looks(&mut cdr);
+    end_marker(&mut cdr);
     cdr.message()
 }
 
 /// The rest of a marker without point colours, texture, text or mesh.
-fn without_looks(cdr: &mut Cdr) {
+fn end_marker(cdr: &mut Cdr) {
     cdr.word(0);
     cdr.text("");
     cdr.header(0, "");

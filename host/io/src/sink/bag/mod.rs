@@ -61,7 +61,7 @@ const LINE_M: f64 = 0.08;
 /// Colour of anything moving: red, green, blue, opacity.
 const MOVING: [f32; 4] = [0.84, 0.15, 0.16, 1.0];
 /// Colour of a stationary object.
-const STANDING: [f32; 4] = [0.45, 0.5, 0.6, 0.6];
+const STATIONARY: [f32; 4] = [0.45, 0.5, 0.6, 0.6];
 /// How long a box is shown after its sweep, ns: a few sweeps of most sensors.
 const BOX_SHOWN_NS: u32 = 250_000_000;
 
@@ -122,8 +122,8 @@ impl BagSink {
     }
 
     /// Whether a viewer is watching; true if there is no server.
-    pub fn is_watched(&self) -> bool {
-        self.live.as_ref().is_none_or(LiveServer::is_watched)
+    pub fn has_viewer(&self) -> bool {
+        self.live.as_ref().is_none_or(LiveServer::has_viewer)
     }
 
     /// Writes a sweep and the flow of the pair that it begins.
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn every_definition_that_is_named_is_there() {
+    fn every_named_definition_exists() {
         for (topic, schema) in
             [Content::FlowAndObjects, Content::Objects].into_iter().flat_map(topics)
         {

@@ -4,7 +4,7 @@
 use raywake_objects::tracked::TrackedObject;
 
 use super::cdr::Cdr;
-use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
+use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STATIONARY, VEHICLE, WORLD};
 
 /// Height of a name, and its distance above the box, m.
 const TEXT_M: f64 = 0.6;
@@ -67,15 +67,15 @@ impl Entity {
         let [x, y, z] = *centre;
         let speed = velocity.map(|[u, v]| u.hypot(v));
         let class = class.map_or("unknown", |(class, _)| class.name());
-        let told = |name, value: Option<String>| value.map(|value| (name, value));
+        let entry = |name, value: Option<String>| value.map(|value| (name, value));
         let metadata = [
-            told("track", Some(id.to_string())),
-            told("class", Some(class.into())),
-            told("speed m/s", Some(format!("{:.2}", speed.unwrap_or(0.0)))),
-            told("P(moves)", p_moves.map(|p| format!("{p:.2}"))),
-            told("length m", Some(format!("{:.2}", size[0]))),
-            told("width m", Some(format!("{:.2}", size[1]))),
-            told("height m", Some(format!("{:.2}", size[2]))),
+            entry("track", Some(id.to_string())),
+            entry("class", Some(class.into())),
+            entry("speed m/s", Some(format!("{:.2}", speed.unwrap_or(0.0)))),
+            entry("P(moves)", p_moves.map(|p| format!("{p:.2}"))),
+            entry("length m", Some(format!("{:.2}", size[0]))),
+            entry("width m", Some(format!("{:.2}", size[1]))),
+            entry("height m", Some(format!("{:.2}", size[2]))),
         ];
         let course = velocity.map(|[u, v]| v.atan2(u));
         let arrow = |(speed, course)| (*centre, course, f64::from(AHEAD_S) * speed);
@@ -86,7 +86,7 @@ impl Entity {
             arrows: speed.zip(course).map(arrow).into_iter().collect(),
             cube: Some((*centre, *heading, size.map(|v| f64::from(v).max(LINE_M)))),
             text: speed.map(|speed| (above, name(speed))),
-            colour: if velocity.is_some() { MOVING } else { STANDING },
+            colour: if velocity.is_some() { MOVING } else { STATIONARY },
         }
     }
 

@@ -65,7 +65,7 @@ mod tests {
                             base_link rear -2 0 0.9 0 0 0 1 # at the rear\n";
 
     /// A recording without `/tf_static`, and options with a file of links.
-    fn told(temp: &Temp, links: &str) -> (PathBuf, OpenOptions) {
+    fn with_links(temp: &Temp, links: &str) -> (PathBuf, OpenOptions) {
         let all: Vec<_> = rig(3).into_iter().filter(|message| message.0 != "/tf_static").collect();
         let extrinsics = Some(temp.write("links.txt", links));
         (temp.write("bare.mcap", file(&all, options())), OpenOptions { extrinsics, ..accept() })
@@ -78,11 +78,11 @@ mod tests {
     }
 
     #[test]
-    fn links_stand_for_those_of_the_recording() {
+    fn given_links_replace_those_of_the_recording() {
         let temp = Temp::new();
         let whole = temp.write("whole.mcap", file(&rig(3), options()));
         let mut whole = open(&whole, &accept()).unwrap();
-        let (path, by_frame) = told(&temp, BY_FRAME);
+        let (path, by_frame) = with_links(&temp, BY_FRAME);
         let e = open(&path, &accept()).err().unwrap().to_string();
         assert!(e.contains("several topics have clouds"), "{e}");
         let mut source = open(&path, &by_frame).unwrap();
@@ -90,12 +90,12 @@ mod tests {
         assert!(source.is_located() && source.rig().sensors == whole.rig().sensors);
         // Topics may be named if drivers use the same frame for all lidars.
         let by_topic = BY_FRAME.replace(" lidar ", " /points ").replace(" rear ", " /rear ");
-        let (path, by_topic) = told(&temp, &by_topic);
+        let (path, by_topic) = with_links(&temp, &by_topic);
         assert_eq!(points(open(&path, &by_topic).unwrap().as_mut()), points(whole.as_mut()));
     }
 
     #[test]
-    fn links_that_are_none_are_named() {
+    fn invalid_links_are_named() {
         let temp = Temp::new();
         for (links, says) in [
             ("base_link lidar", "line 1: expected PARENT CHILD x y z"),
@@ -107,7 +107,7 @@ mod tests {
                 "no clouds or poses in frame `mast`; clouds are in `lidar` of /points",
             ),
         ] {
-            let (path, options) = told(&temp, links);
+            let (path, options) = with_links(&temp, links);
             let e = open(&path, &options).err().unwrap().to_string();
             assert!(e.contains("links.txt") && e.contains(says), "{says} in {e}");
         }

@@ -162,7 +162,7 @@ fn livox(header: CloudHeader, mut wire: Wire, points: &mut Vec<Point>) -> Result
     let fields = Fields::find(&named)?.stamped(header.stamp_ns);
     let value = |point: usize, field: usize| {
         let attribute = Attribute { number: LIVOX[field].1, start: 4 * field, step };
-        attribute.value(data, point, wire.is_big())
+        attribute.value(data, point, wire.is_big_endian())
     };
     Ok(fields.returns(count, value, points))
 }

@@ -85,7 +85,7 @@ impl Bag {
         };
         bag.locate(&contents, &base, options)?;
         bag.set_stamps();
-        bag.look_at_returns(options)?;
+        bag.inspect_returns(options)?;
         Ok(bag)
     }
 
@@ -130,7 +130,7 @@ impl Bag {
             0 => format!("nothing gives the pose of `{base}`"),
             n => format!("{n} sources give the pose of `{base}` ({})", names.join(", ")),
         };
-        options.go_without_poses(&self.root, &found)?;
+        options.proceed_without_poses(&self.root, &found)?;
         self.overview.notes.push(format!("{found}: using registration"));
         Ok(())
     }
@@ -144,7 +144,7 @@ impl Bag {
     }
 
     /// Learns the rest about the rig from the first sweep that has all lidars.
-    fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
+    fn inspect_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let whole = self.sweeps.iter().position(|sweep| sweep.iter().all(Option::is_some));
         let mut first = SweepData::default();
         let timed = self.read_points(whole.unwrap_or(0), &mut first)?;

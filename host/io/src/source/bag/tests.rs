@@ -199,7 +199,7 @@ fn two_lidars_in_one_vehicle_with_odometry_in_two_files() {
 }
 
 #[test]
-fn what_is_cut_is_read_up_to_there_and_what_is_damaged_is_named() {
+fn truncated_files_are_read_up_to_the_cut_and_damage_is_named() {
     let temp = Temp::new();
     let bytes = file(&sweeps(12), options());
     let whole = open(&temp.write("whole.mcap", &bytes), &accept()).unwrap().len();
@@ -233,7 +233,7 @@ fn what_is_cut_is_read_up_to_there_and_what_is_damaged_is_named() {
 }
 
 #[test]
-fn whatever_byte_is_wrong_nothing_panics() {
+fn no_wrong_byte_panics() {
     let temp = Temp::new();
     // Without checksums, which would detect all damage.
     let bytes = file(&rig(2), options().compression(None).calculate_chunk_crcs(false));
@@ -322,7 +322,7 @@ fn messages_that_make_no_sense_are_skipped_or_named() {
 }
 
 #[test]
-fn two_ways_to_say_where_the_vehicle_was_are_one_too_many() {
+fn conflicting_pose_sources_are_refused() {
     let temp = Temp::new();
     let mut all = rig(4);
     let tf = |n: u64| ("/tf", TF, stamp(n), transform(stamp(n), ["map", "base_link"], 0.0, 0.0));
@@ -339,7 +339,7 @@ fn two_ways_to_say_where_the_vehicle_was_are_one_too_many() {
 }
 
 #[test]
-fn files_that_are_no_recording_say_what_to_do() {
+fn files_other_than_recordings_get_advice() {
     let temp = Temp::new();
     for (name, says) in [
         ("a.bag", "mcap convert"),

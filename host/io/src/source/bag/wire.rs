@@ -71,7 +71,7 @@ impl<'a> Wire<'a> {
     }
 
     /// Whether numbers are big-endian.
-    pub fn is_big(&self) -> bool {
+    pub fn is_big_endian(&self) -> bool {
         self.big
     }
 
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_stand_where_the_encoding_puts_them() {
+    fn numbers_lie_where_the_encoding_puts_them() {
         // A byte, a gap of seven, a double; in ROS 1 and version 2 the gap is shorter.
         let double = 2.5f64;
         for (head, gap, big) in [(1, 7, false), (0, 7, true), (7, 3, false), (6, 3, true)] {
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn strings_and_what_is_none() {
+    fn valid_and_invalid_strings() {
         let cdr = [0, 1, 0, 0, 3, 0, 0, 0, b'a', b'b', 0];
         assert_eq!(Wire::new("cdr", &cdr).unwrap().text(), Ok("ab"));
         assert_eq!(Wire::new("ros1", &[2, 0, 0, 0, b'a', b'b']).unwrap().text(), Ok("ab"));

@@ -16,7 +16,7 @@ const RECENT: usize = 64;
 /// Stands for the packets before the first.
 const NEVER: u64 = u64::MAX;
 /// Accepted times of a revolution, ns.
-const TURN_NS: Range<f64> = 1e7..1e9;
+const PERIOD_NS: Range<f64> = 1e7..1e9;
 /// Weight of a new measurement in the time of a revolution, which drifts by parts in a thousand.
 const TURN_SHARE: f64 = 0.125;
 
@@ -32,7 +32,7 @@ pub struct LiveSweep {
     /// Packets missing from it.
     pub lost_packets: u64,
     /// Time of a revolution as estimated by then, ns.
-    pub turn_ns: f64,
+    pub period_ns: f64,
 }
 
 impl LiveSweep {
@@ -40,7 +40,7 @@ impl LiveSweep {
     pub fn of(sensor: &LiveSensor) -> LiveSweep {
         let points = Vec::with_capacity(sensor.returns_max());
         let data = SweepData { points, ..SweepData::default() };
-        LiveSweep { data, stamp_ns: 0, arrived: Instant::now(), lost_packets: 0, turn_ns: 0.0 }
+        LiveSweep { data, stamp_ns: 0, arrived: Instant::now(), lost_packets: 0, period_ns: 0.0 }
     }
 }
 
@@ -67,7 +67,7 @@ pub struct PacketCounts {
 }
 
 /// Where the current revolution began.
-struct Begun {
+struct RevolutionStart {
     firing: Firing,
     /// Since the first whole revolution began, ns.
     stamp_ns: i64,
@@ -79,13 +79,13 @@ pub struct Assembler {
     sensor: LiveSensor,
     counts: PacketCounts,
     /// `None` until a revolution begins: the one in progress at the start is left out.
-    begun: Option<Begun>,
+    begun: Option<RevolutionStart>,
     last: Option<Firing>,
     /// Times of the first firing of the last packets by the sensor's clock, ns, the newest at `at`.
     recent: [u64; RECENT],
     at: usize,
     /// Time of a revolution, ns, once it is known.
-    turn_ns: Option<f64>,
+    period_ns: Option<f64>,
     epoch_ns: u64,
     filling: LiveSweep,
 }
@@ -95,7 +95,7 @@ impl Assembler {
     pub fn new(sensor: LiveSensor) -> Assembler {
         Assembler {
             filling: LiveSweep::of(&sensor),
-            turn_ns: sensor.turn_ns(),
+            period_ns: sensor.period_ns(),
             sensor,
             counts: PacketCounts::default(),
             begun: None,
@@ -131,10 +131,10 @@ impl Assembler {
         mut complete: impl FnMut(&mut LiveSweep),
     ) {
         let sensor = self.sensor.0.clone();
-        if !sensor.is_mine(datagram) {
+        if !sensor.recognises(datagram) {
             return self.foreign();
         }
-        if !sensor.is_sound(datagram) {
+        if !sensor.has_valid_checksum(datagram) {
             self.counts.unsound += 1;
             return;
         }
@@ -203,12 +203,12 @@ impl Assembler {
         let (begun, sweeps_before) = match self.begun.take() {
             None => {
                 self.epoch_ns = stamp_ns;
-                (Begun { firing, stamp_ns: 0, number: 0 }, 0)
+                (RevolutionStart { firing, stamp_ns: 0, number: 0 }, 0)
             }
             Some(begun) => {
-                let (next, turn_ns) = self.after(&begun, firing);
-                self.turn_ns = Some(turn_ns);
-                (self.filling.arrived, self.filling.turn_ns) = (arrived, turn_ns);
+                let (next, period_ns) = self.after(&begun, firing);
+                self.period_ns = Some(period_ns);
+                (self.filling.arrived, self.filling.period_ns) = (arrived, period_ns);
                 complete(&mut self.filling);
                 let sweeps_before = next.number - begun.number - 1;
                 (next, sweeps_before)
@@ -225,21 +225,22 @@ impl Assembler {
 
     /// Stamp and number of a revolution that follows another, and the resulting estimate of the
     /// time of one, ns.
-    fn after(&mut self, begun: &Begun, firing: Firing) -> (Begun, f64) {
+    fn after(&mut self, begun: &RevolutionStart, firing: Firing) -> (RevolutionStart, f64) {
         let mut step_ns = self.sensor.0.since(firing.clock_ns, begun.firing.clock_ns);
         if !(1..=STEP_MAX_NS).contains(&step_ns) {
             self.counts.clock_set += 1;
-            step_ns = self.turn_ns.unwrap_or(TURN_NS.start) as i64;
+            step_ns = self.period_ns.unwrap_or(PERIOD_NS.start) as i64;
         }
         // A sweep may begin within a revolution if packets are missing.
         let within = (f64::from(firing.angle) - f64::from(begun.firing.angle)) / TURN as f64;
-        let turn_ns = self.turn_ns.unwrap_or(step_ns as f64).clamp(TURN_NS.start, TURN_NS.end);
-        let turns = (step_ns as f64 / turn_ns - within).round().max(1.0);
+        let period_ns =
+            self.period_ns.unwrap_or(step_ns as f64).clamp(PERIOD_NS.start, PERIOD_NS.end);
+        let turns = (step_ns as f64 / period_ns - within).round().max(1.0);
         let seen_ns = step_ns as f64 / (turns + within);
         // A revolution that lacks most of its packets gives no estimate.
-        let likely = (0.5..2.0).contains(&(seen_ns / turn_ns));
+        let likely = (0.5..2.0).contains(&(seen_ns / period_ns));
         let share = if likely { TURN_SHARE } else { 0.0 };
         let (stamp_ns, number) = (begun.stamp_ns + step_ns, begun.number + turns as u64);
-        (Begun { firing, stamp_ns, number }, turn_ns + share * (seen_ns - turn_ns))
+        (RevolutionStart { firing, stamp_ns, number }, period_ns + share * (seen_ns - period_ns))
     }
 }

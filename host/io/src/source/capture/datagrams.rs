@@ -67,7 +67,7 @@ pub(super) struct FrameCounts {
     /// Frames shorter than what was sent, or damaged.
     pub cut: u64,
     /// Frames of unknown link types.
-    pub strange: u64,
+    pub unknown_link: u64,
     /// The last frame is cut off by the end of the file.
     pub ends_early: bool,
 }
@@ -248,7 +248,7 @@ impl Frames {
                 return ControlFlow::Continue(());
             }
             None => {
-                counts.strange += 1;
+                counts.unknown_link += 1;
                 return ControlFlow::Continue(());
             }
         };

@@ -14,7 +14,7 @@ use raywake_core::sweep::Point;
 use roxmltree::{Document, Node};
 
 use super::firing::{Firing, REFLECTIVITY_MAX};
-use super::velodyne::{self, BLOCKS, LaserBlock, MEASUREMENTS, TURN_MAX_NS};
+use super::velodyne::{self, BLOCKS, LaserBlock, MEASUREMENTS, PERIOD_MAX_NS};
 use crate::Error;
 use crate::source::boost;
 
@@ -108,7 +108,7 @@ impl Hdl64 {
 
     /// Maximum number of returns in a revolution: at the slowest speed.
     pub fn returns_max(&self) -> usize {
-        ((TURN_MAX_NS / FIRING_NS as f64) as usize + FIRINGS) * LASERS
+        ((PERIOD_MAX_NS / FIRING_NS as f64) as usize + FIRINGS) * LASERS
     }
 
     /// Time from the first firing of a packet to that of the next, ns.
@@ -117,7 +117,7 @@ impl Hdl64 {
     }
 
     /// Whether a packet is from such a sensor: it has blocks of lower lasers.
-    pub fn is_mine(&self, packet: &[u8]) -> bool {
+    pub fn recognises(&self, packet: &[u8]) -> bool {
         packet.len() == velodyne::PACKET
             && (0..2).any(|n| LaserBlock::of(packet, n).is_some_and(|block| block.is_lower))
     }

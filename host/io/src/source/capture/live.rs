@@ -80,8 +80,8 @@ impl LiveSensor {
     }
 
     /// Time of a revolution, ns, if the sensor's settings give it.
-    pub(super) fn turn_ns(&self) -> Option<f64> {
-        self.0.turn_ns()
+    pub(super) fn period_ns(&self) -> Option<f64> {
+        self.0.period_ns()
     }
 
     /// Learns from the first sweep when returns were measured and where the ground is. The vehicle

@@ -114,7 +114,7 @@ impl Capture {
     fn locate(&mut self, options: &OpenOptions) -> Result<(), Error> {
         match &options.poses {
             _ if options.unlocated == Unlocated::Always => Ok(()),
-            None => options.go_without_poses(&self.path, "sensor packets only"),
+            None => options.proceed_without_poses(&self.path, "sensor packets only"),
             Some(_) if options.poses_frame == Some(PosesFrame::Camera) => {
                 Err(Error::Usage("a capture has no camera frame".into()))
             }
@@ -144,8 +144,8 @@ impl Capture {
             if place > next.place {
                 return ControlFlow::Break(());
             }
-            let mine = sender == self.sender && self.sensor.is_mine(payload);
-            if place < cut.place || !mine || !self.sensor.is_sound(payload) {
+            let mine = sender == self.sender && self.sensor.recognises(payload);
+            if place < cut.place || !mine || !self.sensor.has_valid_checksum(payload) {
                 return ControlFlow::Continue(());
             }
             for (number, firing) in self.sensor.firings(payload) {

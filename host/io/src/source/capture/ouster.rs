@@ -116,7 +116,7 @@ pub(super) struct Ouster {
     pub columns: usize,
     pub packet_columns: usize,
     /// Time of a revolution, ns.
-    pub turn_ns: f64,
+    pub period_ns: f64,
     /// Where beams leave the axis: outwards and up, m.
     origin_m: [f64; 2],
     /// From the frame of the beams to that of the sensor: x ahead, y to the left, z up.
@@ -150,7 +150,7 @@ impl Ouster {
             beams: elevations.iter().zip(&azimuths).map(beam).collect(),
             columns,
             packet_columns,
-            turn_ns: metadata.turn_ns(),
+            period_ns: metadata.period_ns(),
             origin_m: metadata.origin_m()?,
             sensor_from_lidar: metadata.sensor_from_lidar()?,
         })
@@ -166,13 +166,13 @@ impl Ouster {
     }
 
     /// Whether a packet may be one of its own, by its length.
-    pub fn is_mine(&self, packet: &[u8]) -> bool {
+    pub fn recognises(&self, packet: &[u8]) -> bool {
         let Profile { packet_head, packet_foot, .. } = self.profile;
         packet.len() == packet_head + self.packet_columns * self.column() + packet_foot
     }
 
     /// Whether the checksum of a packet is right, if it has one.
-    pub fn is_sound(&self, packet: &[u8]) -> bool {
+    pub fn has_valid_checksum(&self, packet: &[u8]) -> bool {
         let Some((content, sum)) = packet.split_last_chunk::<SUM>() else { return false };
         let sum = u64::from_le_bytes(*sum);
         self.profile.packet_foot == 0 || NO_SUM.contains(&sum) || CHECK.checksum(content) == sum
@@ -292,7 +292,7 @@ impl Metadata<'_> {
 
     /// Time of a revolution by the mode, `COLUMNSxHZ`, ns: ten revolutions a second unless it says
     /// otherwise.
-    fn turn_ns(&self) -> f64 {
+    fn period_ns(&self) -> f64 {
         let mode = self.text("lidar_mode").ok().and_then(|mode| mode.split('x').nth(1));
         let hz = mode.and_then(|hz| hz.parse().ok()).filter(|hz| TURNS_HZ.contains(hz));
         1e9 / hz.unwrap_or(10.0)

@@ -48,18 +48,18 @@ impl Sensor {
         }
     }
 
-    pub fn is_mine(&self, packet: &[u8]) -> bool {
+    pub fn recognises(&self, packet: &[u8]) -> bool {
         match self {
-            Sensor::Velodyne(sensor) => sensor.is_mine(packet),
-            Sensor::Hdl64(sensor) => sensor.is_mine(packet),
-            Sensor::Ouster(sensor) => sensor.is_mine(packet),
+            Sensor::Velodyne(sensor) => sensor.recognises(packet),
+            Sensor::Hdl64(sensor) => sensor.recognises(packet),
+            Sensor::Ouster(sensor) => sensor.recognises(packet),
         }
     }
 
-    pub fn is_sound(&self, packet: &[u8]) -> bool {
+    pub fn has_valid_checksum(&self, packet: &[u8]) -> bool {
         match self {
             Sensor::Velodyne(_) | Sensor::Hdl64(_) => true,
-            Sensor::Ouster(sensor) => sensor.is_sound(packet),
+            Sensor::Ouster(sensor) => sensor.has_valid_checksum(packet),
         }
     }
 
@@ -110,16 +110,16 @@ impl Sensor {
             Sensor::Velodyne(sensor) => sensor.packet_ns(packet),
             Sensor::Hdl64(sensor) => sensor.packet_ns(packet),
             Sensor::Ouster(sensor) => {
-                sensor.turn_ns * sensor.packet_columns as f64 / sensor.columns as f64
+                sensor.period_ns * sensor.packet_columns as f64 / sensor.columns as f64
             }
         }
     }
 
     /// Time of a revolution, ns, if the settings give it.
-    pub fn turn_ns(&self) -> Option<f64> {
+    pub fn period_ns(&self) -> Option<f64> {
         match self {
             Sensor::Velodyne(_) | Sensor::Hdl64(_) => None,
-            Sensor::Ouster(sensor) => Some(sensor.turn_ns),
+            Sensor::Ouster(sensor) => Some(sensor.period_ns),
         }
     }
 

@@ -17,7 +17,7 @@ use crate::source::recognise::entries;
 /// firings.
 const WHOLE_MIN: f64 = 0.9;
 /// Maximum number of sensors distinguished in a capture.
-const SENSORS_TOLD: usize = 16;
+const CAPTURE_SENSORS_MAX: usize = 16;
 
 /// Where a sweep begins.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ impl Stream {
 
     fn take(&mut self, datagram: &Datagram) {
         self.packets += 1;
-        if !self.sensor.is_sound(datagram.payload) {
+        if !self.sensor.has_valid_checksum(datagram.payload) {
             self.unsound += 1;
             return;
         }
@@ -112,7 +112,7 @@ impl Stream {
 struct Streams {
     all: Vec<Stream>,
     /// Sensors described by files next to the capture.
-    told: Vec<Sensor>,
+    described: Vec<Sensor>,
     /// Number of datagrams, and bytes of the largest one.
     seen: u64,
     largest: usize,
@@ -123,7 +123,7 @@ impl Streams {
         let Datagram { sender, payload, .. } = *datagram;
         self.seen += 1;
         self.largest = self.largest.max(payload.len());
-        let known = |s: &Stream| s.sender == sender && s.sensor.is_mine(payload);
+        let known = |s: &Stream| s.sender == sender && s.sensor.recognises(payload);
         let known = self.all.iter().position(known).or_else(|| self.find(sender, payload));
         if let Some(n) = known {
             self.all[n].take(datagram);
@@ -133,18 +133,20 @@ impl Streams {
     /// Begins the stream of a sensor that is seen for the first time.
     fn find(&mut self, sender: Sender, packet: &[u8]) -> Option<usize> {
         let velodyne = Velodyne::of(packet).map(|sensor| Sensor::Velodyne(Arc::new(sensor)));
-        let told = || self.told.iter().find(|sensor| sensor.is_mine(packet)).cloned();
-        let sensor = velodyne.or_else(told)?;
-        let room = self.all.len() < SENSORS_TOLD;
+        let described = || self.described.iter().find(|sensor| sensor.recognises(packet)).cloned();
+        let sensor = velodyne.or_else(described)?;
+        let room = self.all.len() < CAPTURE_SENSORS_MAX;
         room.then(|| self.all.push(Stream::new(sender, sensor)))?;
         Some(self.all.len() - 1)
     }
 
     /// The error that no sensor was found.
     fn none(&self, path: &Path) -> Error {
-        let Streams { told, seen, largest, .. } = self;
-        let others = match told.first() {
-            Some(told) => format!("nor of the {} described by a file next to it", told.name()),
+        let Streams { described, seen, largest, .. } = self;
+        let others = match described.first() {
+            Some(described) => {
+                format!("nor of the {} described by a file next to it", described.name())
+            }
             None => "and Ouster's need the sensor's metadata (NAME.json for NAME.pcap), an \
                      HDL-64E's its calibration (NAME.xml)"
                 .into(),
@@ -162,8 +164,8 @@ pub(super) fn streams(
     path: &Path,
     datagrams: &Datagrams,
 ) -> Result<(Vec<Stream>, FrameCounts), Error> {
-    let (told, unread) = told(path)?;
-    let mut streams = Streams { all: Vec::new(), told, seen: 0, largest: 0 };
+    let (described, unread) = described(path)?;
+    let mut streams = Streams { all: Vec::new(), described, seen: 0, largest: 0 };
     let counts = datagrams.each(0, |datagram| {
         streams.take(&datagram);
         ControlFlow::Continue(())
@@ -181,11 +183,11 @@ pub(super) fn notes(stream: &Stream, counts: &FrameCounts) -> Vec<String> {
         (format!("packets with a wrong checksum, of {}", stream.packets), stream.unsound),
         ("late firings".into(), stream.late),
         ("truncated or damaged frames".into(), counts.cut),
-        ("frames of unknown link types".into(), counts.strange),
+        ("frames of unknown link types".into(), counts.unknown_link),
     ];
-    let told = all.into_iter().filter(|(_, count)| *count > 0);
+    let described = all.into_iter().filter(|(_, count)| *count > 0);
     let mut notes: Vec<String> =
-        told.map(|(what, count)| format!("left out: {what} ({count})")).collect();
+        described.map(|(what, count)| format!("left out: {what} ({count})")).collect();
     if counts.ends_early {
         notes.push("the file ends within a frame".into());
     }
@@ -215,23 +217,23 @@ pub(super) fn choose(
 
 /// Sensors described by files next to a capture, and the error of a file that cannot be read: next
 /// to another Velodyne's capture, a file of that name is something else.
-fn told(path: &Path) -> Result<(Vec<Sensor>, Option<Error>), Error> {
-    let json = beside(path, "json")?.map(|path| Ouster::read(&path).map(Arc::new));
-    let xml = beside(path, "xml")?.map(|path| Hdl64::read(&path).map(Arc::new));
+fn described(path: &Path) -> Result<(Vec<Sensor>, Option<Error>), Error> {
+    let json = companion_file(path, "json")?.map(|path| Ouster::read(&path).map(Arc::new));
+    let xml = companion_file(path, "xml")?.map(|path| Hdl64::read(&path).map(Arc::new));
     let both = [json.map(|o| o.map(Sensor::Ouster)), xml.map(|h| h.map(Sensor::Hdl64))];
-    let (mut told, mut unread) = (Vec::new(), None);
+    let (mut described, mut unread) = (Vec::new(), None);
     for one in both.into_iter().flatten() {
         match one {
-            Ok(sensor) => told.push(sensor),
+            Ok(sensor) => described.push(sensor),
             Err(e) => unread = Some(e),
         }
     }
-    Ok((told, unread))
+    Ok((described, unread))
 }
 
 /// The file that belongs to a capture: the one next to it with this extension and the longest name
 /// that begins the capture's.
-fn beside(path: &Path, extension: &str) -> Result<Option<PathBuf>, Error> {
+fn companion_file(path: &Path, extension: &str) -> Result<Option<PathBuf>, Error> {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     let mut files = entries(parent.unwrap_or(Path::new(".")))?;

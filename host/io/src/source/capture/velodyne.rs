@@ -41,7 +41,7 @@ pub(super) const PUCK_HI_RES: u8 = 0x24;
 pub(super) const HDL_32E: u8 = 0x21;
 pub(super) const VLP_32C: u8 = 0x28;
 /// Longest revolution, ns: five a second.
-pub(super) const TURN_MAX_NS: f64 = 2e8;
+pub(super) const PERIOD_MAX_NS: f64 = 2e8;
 
 /// The fixed properties of a model.
 struct Model {
@@ -191,7 +191,7 @@ impl Velodyne {
     /// The sensor that sent a packet; `None` if its model is unknown.
     pub fn of(packet: &[u8]) -> Option<Velodyne> {
         let code = *packet.get(MODEL_AT)?;
-        Velodyne::coded(code).filter(|sensor| sensor.is_mine(packet))
+        Velodyne::coded(code).filter(|sensor| sensor.recognises(packet))
     }
 
     /// The sensor whose packets have this number; `None` if no model has it.
@@ -210,7 +210,7 @@ impl Velodyne {
 
     /// Maximum number of returns in a revolution: at the slowest speed.
     pub fn returns_max(&self) -> usize {
-        let cycles = (TURN_MAX_NS / self.model.cycle_ns) as usize;
+        let cycles = (PERIOD_MAX_NS / self.model.cycle_ns) as usize;
         cycles * self.lasers.len() + BLOCKS * MEASUREMENTS
     }
 
@@ -231,8 +231,8 @@ impl Velodyne {
     }
 
     /// Whether a packet is of this model.
-    pub fn is_mine(&self, packet: &[u8]) -> bool {
-        is_of(packet, self.model.code)
+    pub fn recognises(&self, packet: &[u8]) -> bool {
+        has_model_code(packet, self.model.code)
     }
 
     /// Time and azimuth of a block. `None` if the block is damaged, or the first of a pair.
@@ -270,7 +270,7 @@ impl Velodyne {
     }
 }
 
-fn is_of(packet: &[u8], code: u8) -> bool {
+fn has_model_code(packet: &[u8], code: u8) -> bool {
     let whole = packet.len() == PACKET && packet.starts_with(&FLAG);
     // In packets of an HDL-64E this byte is something else.
     whole && packet[MODEL_AT] == code && !packet[BLOCK..].starts_with(&LOWER)

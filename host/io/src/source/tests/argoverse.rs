@@ -153,7 +153,7 @@ fn missing_and_wrong_columns() {
 }
 
 #[test]
-fn a_pose_that_is_none() {
+fn an_invalid_pose() {
     let t = log();
     let mut columns: Vec<(&str, ArrayRef)> =
         vec![("timestamp_ns", Arc::new(Int64Array::from(vec![STAMP, STAMP + 100_000_000])))];
@@ -218,7 +218,7 @@ fn dictionaries_are_refused() {
 }
 
 #[test]
-fn what_unpacks_to_too_much_is_refused() {
+fn excessive_unpacked_sizes_are_refused() {
     let zeros: ArrayRef = Arc::new(UInt8Array::from(vec![0; 100 << 20]));
     let batches = vec![batch(vec![("x", zeros)]); 3];
     let bytes = file(&batches, Some(CompressionType::ZSTD));
@@ -272,7 +272,7 @@ fn own_poses_only() {
 }
 
 #[test]
-fn lasers_are_told_apart_by_their_elevation() {
+fn lasers_are_distinguished_by_elevation() {
     // Laser 0 is the lower scanner's, at 3 degrees, laser 33 the upper one's, at -2 degrees.
     let t = log();
     let (mut x, mut y, mut z, mut lasers) = (vec![], vec![], vec![], vec![]);

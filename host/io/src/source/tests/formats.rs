@@ -192,7 +192,7 @@ fn folder_of_clouds() {
 }
 
 #[test]
-fn a_turn_is_the_mean_of_coarse_stamps() {
+fn revolution_time_is_the_mean_of_coarse_stamps() {
     let t = Temp::new();
     let mut times = String::new();
     // Revolutions of 0.104 s by a clock of 10 ms, one missing after the tenth.

@@ -86,7 +86,7 @@ fn a_scene_is_read() {
 }
 
 #[test]
-fn what_is_wrong_with_scenes_is_told() {
+fn errors_in_scenes_are_reported() {
     let t = scenes();
     let error = |options: &OpenOptions| open(t.path(), options).err().unwrap().to_string();
     let says = error(&OpenOptions::default());

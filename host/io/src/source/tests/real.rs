@@ -29,7 +29,7 @@ fn kitti_city_drive() {
 
 #[test]
 #[ignore = "needs RAYWAKE_DATA"]
-fn kitti_standing_still() {
+fn kitti_stationary_vehicle() {
     let mut source = opened(&data("kitti_raw_20110926_1430_11"));
     assert_eq!(source.len(), 11);
     let sweep = read(source.as_mut(), 5).unwrap();

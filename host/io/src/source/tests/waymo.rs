@@ -149,7 +149,7 @@ fn a_segment_is_read() {
 }
 
 #[test]
-fn what_is_wrong_with_segments_is_told() {
+fn errors_in_segments_are_reported() {
     let t = segment(4);
     let asked = |names: &[&str]| {
         let topics = names.iter().map(|name| (*name).into()).collect();

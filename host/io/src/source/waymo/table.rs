@@ -209,7 +209,7 @@ fn check_footer(file: &File, length: u64) -> Result<(), ParquetError> {
     let size = u64::from(u32::from_le_bytes([end[0], end[1], end[2], end[3]]));
     // If it is not such a file, the decoder says so.
     let Some(from) = at.checked_sub(size) else { return Ok(()) };
-    if thrift::is_sound(&read_at(file, from, size)?) { Ok(()) } else { Err(damaged("footer")) }
+    if thrift::is_bounded(&read_at(file, from, size)?) { Ok(()) } else { Err(damaged("footer")) }
 }
 
 /// Reads this many bytes of a file, which has them.
@@ -335,7 +335,7 @@ mod tests {
 
     /// Lists of a million numbers that are all missing: a file of some hundred bytes.
     #[test]
-    fn what_is_filled_up_to_too_much() {
+    fn excessive_padding() {
         let t = Temp::new();
         let path = t.write("x.parquet", b"");
         let field = Arc::new(Field::new("item", DataType::Float32, true));
@@ -351,7 +351,7 @@ mod tests {
 
     /// A million equal numbers in one row: a file of some hundred bytes.
     #[test]
-    fn what_unpacks_to_too_much() {
+    fn excessive_unpacked_sizes() {
         const MANY: usize = 1 << 20;
         let t = Temp::new();
         let path = t.write("x.parquet", b"");

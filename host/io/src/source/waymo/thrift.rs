@@ -17,7 +17,7 @@ pub(super) struct PageHeader {
 }
 
 /// Whether bytes begin with a structure in which every element takes bytes of its own.
-pub(super) fn is_sound(bytes: &[u8]) -> bool {
+pub(super) fn is_bounded(bytes: &[u8]) -> bool {
     Elements { left: bytes }.fields(0, |_, _| {}).is_some()
 }
 
@@ -135,10 +135,10 @@ mod tests {
     const PAGE: [u8; 13] = [0x15, 4, 0x15, 5, 0x15, 0xd8, 4, 0x2c, 0x18, 1, b'x', 0, 0];
 
     #[test]
-    fn a_header_and_how_much_follows() {
+    fn a_header_and_the_length_of_its_data() {
         let long = [&PAGE[..], &[7; 9]].concat();
         assert_eq!(page_header(&long), Some(PageHeader { length: 13, compressed: 300 }));
-        assert!(is_sound(&PAGE) && (0..13).all(|end| page_header(&PAGE[..end]).is_none()));
+        assert!(is_bounded(&PAGE) && (0..13).all(|end| page_header(&PAGE[..end]).is_none()));
         // A negative number of bytes follows, or the number is missing.
         assert_eq!(page_header(&[0x35, 1, 0]), None);
         assert_eq!(page_header(&[0x15, 2, 0]), None);
@@ -149,11 +149,11 @@ mod tests {
         let list =
             |kind: u8, count: [u8; 2]| [&[0x19, 0xf0 | kind][..], &count, &[1, 2, 0]].concat();
         // Two one-byte numbers; three, one of which is missing.
-        assert!(is_sound(&list(3, [0x82, 0])) && !is_sound(&list(3, [0x83, 0])));
+        assert!(is_bounded(&list(3, [0x82, 0])) && !is_bounded(&list(3, [0x83, 0])));
         // Booleans, a map of them, and endlessly nested lists.
-        assert!(!is_sound(&list(1, [0xff, 0x7f])));
-        assert!(!is_sound(&[0x1b, 5, 0x11, 0, 0, 0]));
-        assert!(!is_sound(&[&[0x19][..], &[0x19; 1000], &[0; 9]].concat()));
-        assert!(!is_sound(&[&[0x1c; 1000][..], &[0; 1001]].concat()));
+        assert!(!is_bounded(&list(1, [0xff, 0x7f])));
+        assert!(!is_bounded(&[0x1b, 5, 0x11, 0, 0, 0]));
+        assert!(!is_bounded(&[&[0x19][..], &[0x19; 1000], &[0; 9]].concat()));
+        assert!(!is_bounded(&[&[0x1c; 1000][..], &[0; 1001]].concat()));
     }
 }

@@ -54,7 +54,7 @@ fn the_same_sweeps_as_those_of_a_capture() {
     let mut assembler = Assembler::new(vlp());
     let mut turns_ns = Vec::new();
     for packet in &packets {
-        assembler.take(packet, Instant::now(), NOW_NS, |sweep| turns_ns.push(sweep.turn_ns));
+        assembler.take(packet, Instant::now(), NOW_NS, |sweep| turns_ns.push(sweep.period_ns));
     }
     assert_eq!(turns_ns, [75.0 * 1_327_000.0; 3]);
     // If a capture begins with a revolution, that one is left out.
@@ -98,7 +98,7 @@ fn wrong_check_sums_are_counted() {
 
 /// A sensor that stands still, and one whose clock is set.
 #[test]
-fn what_no_turn_ends_is_bounded() {
+fn incomplete_revolutions_are_bounded() {
     let mut still = turns(0..130);
     let stuck = (0..2000).map(|n| {
         let mut packet = vlp16(129);
@@ -123,18 +123,18 @@ fn what_no_turn_ends_is_bounded() {
 /// Any bytes.
 #[test]
 fn nonsense_is_counted() {
-    spoil(&vlp(), &turns(0..4000));
+    corrupt(&vlp(), &turns(0..4000));
 }
 
 /// Damages a quarter of the packets of a sensor.
-pub(super) fn spoil(sensor: &LiveSensor, packets: &[Vec<u8>]) {
+pub(super) fn corrupt(sensor: &LiveSensor, packets: &[Vec<u8>]) {
     let mut random = Random(20);
-    let spoil = |packet: &Vec<u8>| match random.below(4) {
+    let corrupt = |packet: &Vec<u8>| match random.below(4) {
         0 => damaged(packet, &mut random),
         _ => packet.clone(),
     };
-    let spoilt: Vec<Vec<u8>> = packets.iter().map(spoil).collect();
-    let (live, counts) = assembled(sensor, &spoilt);
+    let corrupt_some: Vec<Vec<u8>> = packets.iter().map(corrupt).collect();
+    let (live, counts) = assembled(sensor, &corrupt_some);
     assert_eq!(counts.packets + counts.foreign, packets.len() as u64);
     assert!(counts.foreign > packets.len() as u64 / 40 && !live.is_empty(), "{counts:?}");
     assert!(live.iter().all(|sweep| sweep.points.len() <= sensor.returns_max()));

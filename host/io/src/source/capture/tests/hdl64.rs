@@ -121,7 +121,7 @@ fn two_returns_of_a_beam() {
 }
 
 #[test]
-fn calibrations_that_are_none() {
+fn invalid_calibrations() {
     let folder = Temp::new();
     let path = recorded(&folder, &packets(false)[..10]);
     assert!(wrong(&path).contains("an HDL-64E's its calibration (NAME.xml)"), "{}", wrong(&path));
@@ -173,7 +173,7 @@ fn live() {
     let (sweeps, counts) = arriving::assembled(&sensor, &packets(false));
     assert_eq!((counts.packets, counts.foreign, counts.missing), (700, 0, 0));
     assert_eq!(sweeps.last().unwrap().points.len(), 300 * 6 * 64);
-    arriving::spoil(&sensor, &packets(false));
+    arriving::corrupt(&sensor, &packets(false));
     let (_, counts) = arriving::assembled(&sensor, &turns(0..10));
     assert_eq!((counts.packets, counts.foreign), (0, 10));
     let missing = LiveSensor::of(SensorModel::Hdl64e, None).err().unwrap().to_string();

@@ -160,7 +160,7 @@ fn fields_of_an_os0() {
     let all = payloads("OS-0-128-U1_v2.3.0_1024x10.pcap", 8448);
     assert_eq!(all.len(), 64);
     for packet in &all {
-        assert!(ouster.is_mine(packet) && ouster.is_sound(packet));
+        assert!(ouster.recognises(packet) && ouster.has_valid_checksum(packet));
         for beam in 0..128 {
             for column in 0..16 {
                 let (range, reflectivity) =
@@ -192,7 +192,7 @@ fn fields_of_an_os0() {
 
 /// Three sweeps of a moving OS1 whose trajectory is known to the manufacturer.
 #[test]
-fn way_of_an_os1() {
+fn trajectory_of_an_os1() {
     let mut source = opened(&packets("OS-1-128_v2.3.0_1024x10_lb_n3.pcap"));
     let all = sweeps(&mut source);
     assert_eq!((all.len(), source.overview.frames.clone()), (3, vec![0, 1, 2]));
@@ -215,7 +215,7 @@ fn way_of_an_os1() {
 
 /// A sweep is the same whether read alone or after others; and its poses may be in a file.
 #[test]
-fn any_order_and_poses() {
+fn any_order_with_poses() {
     let path = packets("OS-1-128_v2.3.0_1024x10_lb_n3.pcap");
     let poses = Some(packets("OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"));
     let mut source =

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::judged::Judged;
+use super::verdict::ReturnVerdict;
 
 /// The returns in a voxel.
 #[derive(Clone, Copy, Default)]
@@ -18,29 +18,29 @@ struct VoxelReturns {
 }
 
 /// The static map, growing with the drive.
-pub struct StillMap {
+pub struct StaticMap {
     voxel_m: f64,
     voxels: HashMap<[i32; 3], VoxelReturns>,
 }
 
-impl StillMap {
-    pub fn new(voxel_m: f64) -> StillMap {
-        StillMap { voxel_m, voxels: HashMap::new() }
+impl StaticMap {
+    pub fn new(voxel_m: f64) -> StaticMap {
+        StaticMap { voxel_m, voxels: HashMap::new() }
     }
 
     /// Adds a return at a world position.
-    pub fn add(&mut self, at: DVec3, intensity: f32, judged: Judged) {
+    pub fn add(&mut self, at: DVec3, intensity: f32, judged: ReturnVerdict) {
         let index = (at / self.voxel_m).floor();
         let key = index.to_array().map(|c| c as i32);
         match judged {
-            Judged::Moving => self.voxels.entry(key).or_default().moving += 1,
-            Judged::Static => {
+            ReturnVerdict::Moving => self.voxels.entry(key).or_default().moving += 1,
+            ReturnVerdict::Static => {
                 let seen = self.voxels.entry(key).or_default();
                 let [x, y, z] = (at - index * self.voxel_m).as_vec3().to_array();
                 seen.sum.iter_mut().zip([x, y, z, intensity]).for_each(|(sum, v)| *sum += v);
                 seen.still += 1;
             }
-            Judged::None | Judged::Unknown => {}
+            ReturnVerdict::None | ReturnVerdict::Unknown => {}
         }
     }
 
@@ -65,14 +65,14 @@ mod tests {
 
     #[test]
     fn voxels_that_mostly_moved_are_left_out() {
-        let mut map = StillMap::new(0.5);
+        let mut map = StaticMap::new(0.5);
         for (x, judged) in [
-            (-0.3, Judged::Static),
-            (-0.1, Judged::Static),
-            (-0.2, Judged::Moving),
-            (0.2, Judged::Static),
-            (0.3, Judged::Moving),
-            (0.7, Judged::Unknown),
+            (-0.3, ReturnVerdict::Static),
+            (-0.1, ReturnVerdict::Static),
+            (-0.2, ReturnVerdict::Moving),
+            (0.2, ReturnVerdict::Static),
+            (0.3, ReturnVerdict::Moving),
+            (0.7, ReturnVerdict::Unknown),
         ] {
             map.add(DVec3::new(x, 1.25, 0.0), 0.5, judged);
         }

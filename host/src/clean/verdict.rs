@@ -10,7 +10,7 @@ const MOVING: u32 = 251;
 /// The verdict on a return from both passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Judged {
+pub enum ReturnVerdict {
     /// No surface: no echo, the own vehicle, not finite.
     None,
     /// Outside the window or over capacity in both passes.
@@ -19,15 +19,16 @@ pub enum Judged {
     Moving,
 }
 
-impl Judged {
+impl ReturnVerdict {
     /// All verdicts, in order of discriminant.
-    const ALL: [Judged; 4] = [Judged::None, Judged::Unknown, Judged::Static, Judged::Moving];
+    const ALL: [ReturnVerdict; 4] =
+        [ReturnVerdict::None, ReturnVerdict::Unknown, ReturnVerdict::Static, ReturnVerdict::Moving];
 
     pub fn label(self) -> u32 {
         match self {
-            Judged::None | Judged::Unknown => UNLABELLED,
-            Judged::Static => STATIC,
-            Judged::Moving => MOVING,
+            ReturnVerdict::None | ReturnVerdict::Unknown => UNLABELLED,
+            ReturnVerdict::Static => STATIC,
+            ReturnVerdict::Moving => MOVING,
         }
     }
 }
@@ -72,11 +73,11 @@ impl Nibbles {
 
 /// The results of one pass for the returns of a sweep.
 #[derive(Clone, Debug, Default)]
-pub struct OneWay(Nibbles);
+pub struct PassResults(Nibbles);
 
-impl OneWay {
-    pub fn of(flows: impl ExactSizeIterator<Item = PointFlow>) -> OneWay {
-        OneWay(Nibbles::of(flows.map(|flow| nibble(&flow))))
+impl PassResults {
+    pub fn of(flows: impl ExactSizeIterator<Item = PointFlow>) -> PassResults {
+        PassResults(Nibbles::of(flows.map(|flow| nibble(&flow))))
     }
 
     fn get(&self, n: usize) -> Nibble {
@@ -90,30 +91,31 @@ pub struct Verdicts(Nibbles);
 
 impl Verdicts {
     /// The verdicts on the given number of returns from both passes.
-    pub fn of(ways: [&OneWay; 2], returns: usize, moving: f32) -> Verdicts {
-        Verdicts(Nibbles::of((0..returns).map(|n| judge(ways, n, moving) as Nibble)))
+    pub fn of(passes: [&PassResults; 2], returns: usize, moving: f32) -> Verdicts {
+        Verdicts(Nibbles::of((0..returns).map(|n| judge(passes, n, moving) as Nibble)))
     }
 
     /// The verdicts, for the given number of returns.
-    pub fn all(&self, returns: usize) -> Vec<Judged> {
-        let judged = |n| self.0.get(n).and_then(|nibble| Judged::ALL.get(usize::from(nibble)));
-        (0..returns).map(|n| judged(n).copied().unwrap_or(Judged::Unknown)).collect()
+    pub fn all(&self, returns: usize) -> Vec<ReturnVerdict> {
+        let judged =
+            |n| self.0.get(n).and_then(|nibble| ReturnVerdict::ALL.get(usize::from(nibble)));
+        (0..returns).map(|n| judged(n).copied().unwrap_or(ReturnVerdict::Unknown)).collect()
     }
 }
 
 /// The verdict on a return from both passes: it moves if the mean P(moves) of the passes that
 /// examined it reaches `moving`.
-fn judge(ways: [&OneWay; 2], n: usize, moving: f32) -> Judged {
-    let told = ways.map(|way| way.get(n));
-    if told.contains(&NONE) {
-        return Judged::None;
+fn judge(passes: [&PassResults; 2], n: usize, moving: f32) -> ReturnVerdict {
+    let results = passes.map(|pass| pass.get(n));
+    if results.contains(&NONE) {
+        return ReturnVerdict::None;
     }
-    let looked = || told.into_iter().filter(|nibble| *nibble <= SURE);
-    let sum: f32 = looked().map(f32::from).sum();
-    match looked().count() {
-        0 => Judged::Unknown,
-        count if sum >= moving * f32::from(SURE) * count as f32 => Judged::Moving,
-        _ => Judged::Static,
+    let examined = || results.into_iter().filter(|nibble| *nibble <= SURE);
+    let sum: f32 = examined().map(f32::from).sum();
+    match examined().count() {
+        0 => ReturnVerdict::Unknown,
+        count if sum >= moving * f32::from(SURE) * count as f32 => ReturnVerdict::Moving,
+        _ => ReturnVerdict::Static,
     }
 }
 
@@ -122,36 +124,41 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_ways_are_heard() {
+    fn both_passes_count() {
         let flow = |status, probability| PointFlow { status, probability, ..PointFlow::default() };
         let out = flow(Status::OutsideWindow, 0.0);
         let own = flow(Status::OwnVehicle, 0.0);
         let [still, unsure] = [0.0, 0.3].map(|p| flow(Status::Static, p));
         let moving = flow(Status::Moving, 0.9);
         for (forwards, backwards, judged) in [
-            (moving, moving, Judged::Moving),
-            (moving, still, Judged::Moving),
-            (unsure, still, Judged::Static),
-            (unsure, unsure, Judged::Static),
-            (out, moving, Judged::Moving),
-            (still, out, Judged::Static),
-            (out, out, Judged::Unknown),
-            (own, still, Judged::None),
+            (moving, moving, ReturnVerdict::Moving),
+            (moving, still, ReturnVerdict::Moving),
+            (unsure, still, ReturnVerdict::Static),
+            (unsure, unsure, ReturnVerdict::Static),
+            (out, moving, ReturnVerdict::Moving),
+            (still, out, ReturnVerdict::Static),
+            (out, out, ReturnVerdict::Unknown),
+            (own, still, ReturnVerdict::None),
         ] {
             // In either half of a byte.
             for n in 0..3 {
-                let way = |flow| OneWay::of((0..3).map(|k| if k == n { flow } else { still }));
-                let ways = [way(forwards), way(backwards)];
-                assert_eq!(judge([&ways[0], &ways[1]], n, 0.4), judged, "{n}");
+                let pass =
+                    |flow| PassResults::of((0..3).map(|k| if k == n { flow } else { still }));
+                let passes = [pass(forwards), pass(backwards)];
+                assert_eq!(judge([&passes[0], &passes[1]], n, 0.4), judged, "{n}");
             }
         }
-        let nothing = OneWay::default();
-        assert_eq!(judge([&nothing, &nothing], 7, 0.4), Judged::Unknown);
-        assert_eq!(Judged::ALL.map(Judged::label), [0, 0, 9, 251]);
-        let way = OneWay::of([moving, still, own, out, moving].into_iter());
-        let verdicts = Verdicts::of([&way, &way], 5, 0.4);
-        let [moves, stands, none, unknown] =
-            [Judged::Moving, Judged::Static, Judged::None, Judged::Unknown];
+        let nothing = PassResults::default();
+        assert_eq!(judge([&nothing, &nothing], 7, 0.4), ReturnVerdict::Unknown);
+        assert_eq!(ReturnVerdict::ALL.map(ReturnVerdict::label), [0, 0, 9, 251]);
+        let pass = PassResults::of([moving, still, own, out, moving].into_iter());
+        let verdicts = Verdicts::of([&pass, &pass], 5, 0.4);
+        let [moves, stands, none, unknown] = [
+            ReturnVerdict::Moving,
+            ReturnVerdict::Static,
+            ReturnVerdict::None,
+            ReturnVerdict::Unknown,
+        ];
         assert_eq!(verdicts.all(5), [moves, stands, none, unknown, moves]);
         assert_eq!(Verdicts::default().all(1), [unknown]);
     }

@@ -17,12 +17,12 @@ const MARGIN: f64 = 0.02;
 
 /// Fixtures and parked objects.
 #[derive(Clone)]
-pub(crate) struct Still {
+pub(crate) struct StaticScene {
     targets: Vec<Target>,
     boxes: Bvh2,
 }
 
-impl fmt::Debug for Still {
+impl fmt::Debug for StaticScene {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "Still({} targets)", self.targets.len())
     }
@@ -36,12 +36,12 @@ impl Boundable for Target {
     }
 }
 
-impl Still {
-    pub(crate) fn new(scene: &Scene) -> Still {
+impl StaticScene {
+    pub(crate) fn new(scene: &Scene) -> StaticScene {
         let fixtures = (1..).zip(&scene.fixtures);
         let mut targets: Vec<Target> =
             fixtures.map(|(n, f)| Target::solid(f.shape, f.pose, f.surface, f.class, n)).collect();
-        for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| o.is_still()) {
+        for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| o.is_static()) {
             let part = |p| {
                 let pose = object.part_pose(p, &scene.ground, 0.0);
                 Target::of_part(index, object, p, pose, false)
@@ -50,7 +50,7 @@ impl Still {
         }
         let build = BvhBuildParams::medium_build();
         let boxes = build_bvh2(&targets, build, &mut Duration::default());
-        Still { targets, boxes }
+        StaticScene { targets, boxes }
     }
 
     /// Replaces the hit if the ray meets one of these targets nearer.
@@ -82,11 +82,11 @@ mod tests {
     use crate::rng::Rng;
 
     #[test]
-    fn as_by_asking_every_target() {
+    fn equals_brute_force_over_all_targets() {
         let mut hits = 0;
         for seed in 0..4 {
             let scene = Scene::street(seed);
-            let still = Still::new(&scene);
+            let still = StaticScene::new(&scene);
             let mut rng = Rng::new(seed);
             for n in 0..4000 {
                 let mut any = || DVec3::new(rng.bell(), rng.bell(), 0.2 * rng.bell());
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn nothing_at_all() {
-        let still = Still::new(&Scene::empty());
+        let still = StaticScene::new(&Scene::empty());
         let mut hit = Hit { range: 9.0, cosine: 0.0, target: None };
         let ray = Ray { origin: DVec3::ZERO, direction: DVec3::X, seed: 1 };
         still.nearest(&ray, &mut hit);
