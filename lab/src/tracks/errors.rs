@@ -33,7 +33,7 @@ impl Alignment {
     }
 
     /// Transforms a point from the tracker's frame to the true one.
-    pub fn to_true_frame(&self, at: DVec3) -> DVec3 {
+    pub fn to_true_frame(self, at: DVec3) -> DVec3 {
         let off = at - self.offset;
         DVec2::from_angle(-self.heading).rotate(off.truncate()).extend(off.z)
     }
