@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Prints what `raywake live --send 127.0.0.1:9000` sends.
 
-A datagram, little-endian, consists of a head and records of one kind. The head: `RWF2`, the kind
-(u16), the number of records that follow, the number of this datagram and how many there are of its
-kind (u16 each), the sweep's number (u32) and its stamp (u64, ns since 1970). Positions, in m, and
-velocities over ground, in m/s, are along the vehicle's axes at that sweep. Kinds:
+A datagram, little-endian, consists of a header and records of one kind. The header: `RWF2`, the
+kind (u16), the number of records that follow, the number of this datagram and how many there are of
+its kind (u16 each), the sweep's number (u32) and its stamp (u64, ns since 1970). Positions, in m,
+and velocities over ground, in m/s, are along the vehicle's axes at that sweep. Kinds:
 
 0 sweep, sent after the rest of it: x, y, z and quaternion x, y, z, w of the vehicle in the world
-  (f64); time since the previous sweep, s, and latency from the last packet, ms (f32); sweeps left
-  out so far (u64); numbers of columns, tracklets and objects sent, and 0 (u32); stamp of the
+  (f64); time since the previous sweep, s, and latency from the last packet, ms (f32); sweeps
+  dropped so far (u64); numbers of columns, tracklets and objects sent, and 0 (u32); stamp of the
   previous sweep, ns (u64)
 1 moving column in the previous sweep: x, y, velocity x, y, covariance xx, xy, yy, P(moves) (f32)
 2 moving tracklet: x, y, velocity x, y, turn rate, rad/s (f32); observations (u32); standard

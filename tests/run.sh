@@ -80,8 +80,8 @@ if rustup toolchain install $nightly --profile minimal -c miri -c rust-src >/dev
     # Its memory is borrowed permanently.
     MIRIFLAGS=-Zmiri-ignore-leaks \
         miri --target riscv64gc-unknown-linux-gnu -p raywake-embed
-    miri --target riscv64gc-unknown-linux-gnu -p raywake-core -- continuity digest dropped output \
-        params pose:: surface footprint prepare::tests::every prepare::tests::static
+    miri --target riscv64gc-unknown-linux-gnu -p raywake-core -- continuity:: digest:: dropped:: \
+        output:: params:: pose:: surface:: footprint:: prepare::tests::every prepare::tests::static
 else
     echo "skipped: Miri cannot be installed"
 fi

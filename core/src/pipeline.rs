@@ -62,12 +62,12 @@ impl Pipeline {
     pub fn step<'o, P: Perceive>(
         &mut self,
         setup: &Setup,
-        machine: StepContext<P, impl Team, impl StageTimer + Send>,
+        context: StepContext<P, impl Team, impl StageTimer + Send>,
         sweep: &Sweep,
         before: &'o [Point],
         out: Output<'o>,
     ) -> Result<SweepOutput<'o>, P::Error> {
-        let StepContext { backend, team, timer } = machine;
+        let StepContext { backend, team, timer } = context;
         let profile = &setup.profile;
         let sweep = &Sweep { twist: sweep.twist.to_grain(), ..*sweep };
         let arrival = self.sides.advance(profile, &setup.rig, sweep);

@@ -22,8 +22,8 @@ pub(crate) struct Returns {
     placed: [Placed; POINTS_MAX],
 }
 
-/// A sweep as rays.
-pub(crate) struct SweepRays {
+/// What the stages need of a sweep besides its rays.
+pub(crate) struct PreparedSweep {
     pub uniform: SweepUniform,
     pub dropped: DroppedReturns,
 }
@@ -47,7 +47,7 @@ impl Returns {
         placement: &Placement,
         [shift_x, shift_y, shift_z]: [i32; 3],
         (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
-    ) -> SweepRays {
+    ) -> PreparedSweep {
         let profile = &setup.profile;
         self.now = 1 - self.now;
         let (columns, placed) = (&mut self.column[self.now], &mut self.placed);
@@ -64,11 +64,11 @@ impl Returns {
             score_min: setup.scores.min,
             ..uniform_of(profile, count)
         };
-        SweepRays { uniform, dropped }
+        PreparedSweep { uniform, dropped }
     }
 
-    /// Passes the sent sweep on to the refinement. Returns the number of returns that this had no
-    /// room for and ignores.
+    /// Passes the prepared sweep on to the refinement. Returns the number of returns for which
+    /// this had no room, and which it ignores.
     pub fn insert(
         &mut self,
         refinement: &mut Refinement,

@@ -79,22 +79,22 @@ pub(crate) fn each<T: Send>(
 }
 
 /// Calls `work` with ranges of rows and the output for them, `length` elements per row, until all
-/// are done; ranges of at most `least` rows are not split further.
+/// are done; ranges of at most `piece_max` rows are not split further.
 pub(crate) fn share<T: Send>(
     workers: &dyn Workers,
-    least: usize,
+    piece_max: usize,
     rows: Range<usize>,
     out: &mut [T],
     length: usize,
     work: &(dyn Fn(Range<usize>, &mut [T]) + Sync),
 ) {
-    if rows.len() <= least {
+    if rows.len() <= piece_max {
         return work(rows, out);
     }
     let middle = rows.start + rows.len() / 2;
     let (first, second) = out.split_at_mut((middle - rows.start) * length);
     workers.join_both(
-        &mut || share(workers, least, rows.start..middle, first, length, work),
-        &mut || share(workers, least, middle..rows.end, second, length, work),
+        &mut || share(workers, piece_max, rows.start..middle, first, length, work),
+        &mut || share(workers, piece_max, middle..rows.end, second, length, work),
     );
 }

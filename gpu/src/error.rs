@@ -94,7 +94,7 @@ impl fmt::Display for FailurePoint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.last {
             Some((index, name)) => {
-                write!(f, "`{}`, after step {index} `{name}`", self.program)
+                write!(f, "`{}` (after step {index} `{name}`)", self.program)
             }
             None => write!(f, "`{}`", self.program),
         }

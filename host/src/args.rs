@@ -39,7 +39,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
     0  success
     2  usage error, or a feature not compiled in
-    3  an input file is missing, unreadable or invalid
+    3  an input file is missing, unreadable or invalid, or two clouds cannot be registered
     4  an output file cannot be written
     5  Vulkan device error
     6  more memory needed than `budget --limit` allows or the machine has
@@ -69,6 +69,7 @@ pub enum Command {
     #[command(after_help = EXIT_CODES)]
     Live(Box<LiveArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
+    #[command(after_help = EXIT_CODES)]
     Map(Box<MapArgs>),
     /// Estimate the poses of a recording by registering its sweeps
     #[command(after_help = EXIT_CODES)]

@@ -89,7 +89,7 @@ fn set(s: &mut Settings, to: &ParameterSetting) -> Result<(), String> {
             let place = group.map_or(String::new(), |g| format!(" in `{g}`"));
             format!("there is no parameter `{name}`{place} (see PARAMETERS.md)")
         }
-        AssignError::WrongType(requirement) => format!("`{name}` must be {requirement}"),
+        AssignError::InvalidValue(requirement) => format!("`{name}` must be {requirement}"),
     })
 }
 

@@ -93,5 +93,7 @@ pub fn bytes(bytes: u64) -> String {
 /// Formats output for programs as pretty-printed JSON.
 pub fn json(what: &impl Serialize) -> Result<String, Error> {
     let text = serde_json::to_string_pretty(what);
-    Ok(text.map_err(|e| Error::Unsupported(format!("cannot be written as JSON: {e}")))? + "\n")
+    Ok(text
+        .map_err(|e| Error::Unsupported(format!("the result cannot be written as JSON: {e}")))?
+        + "\n")
 }

@@ -210,7 +210,7 @@ fn step<'a>(
     timer: &mut (impl StageTimer + Send),
 ) -> Result<SweepOutput<'a>, RunError> {
     parts.step(|Parts { setup, pipeline, backend, team, columns, points }| {
-        let machine = StepContext { backend, team, timer };
-        Ok(pipeline.step(setup, machine, sweep, before, Output { columns, points })?)
+        let context = StepContext { backend, team, timer };
+        Ok(pipeline.step(setup, context, sweep, before, Output { columns, points })?)
     })
 }

@@ -37,7 +37,7 @@ pub struct Args {
 const CORES: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// A run on the device, and one without it.
-struct Runs {
+struct RunPair {
     name: String,
     device: ProgramRun,
     scalar: ProgramRun,
@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         if let Some(what) = failure {
             return Err(Error::Usage(format!("{name}, {}: {what}", device.text("device"))));
         }
-        Ok(Runs { name: name.to_owned(), device, scalar })
+        Ok(RunPair { name: name.to_owned(), device, scalar })
     };
     let shipped = Profile::shipped();
     let profiles = shipped.iter().map(|profile| both(&profile.name, &[], &profile.name));
@@ -92,7 +92,7 @@ fn on_device() -> Vec<&'static str> {
     names
 }
 
-fn conclude(args: &Args, profiles: &[Runs], threads: &[Runs]) -> Result<Results, Error> {
+fn conclude(args: &Args, profiles: &[RunPair], threads: &[RunPair]) -> Result<Results, Error> {
     let name = profiles.first().map_or("", |both| both.device.text("device"));
     let mut report = Report::new("A Vulkan device and the CPU alone", "Side by side, same digest");
     report.fact("Device", name);
@@ -107,7 +107,7 @@ fn conclude(args: &Args, profiles: &[Runs], threads: &[Runs]) -> Result<Results,
 }
 
 /// Whole sweeps, and the part of them that the CPU does alongside the device.
-fn totals(id: &str, what: &str, runs: &[Runs]) -> Result<Table, Error> {
+fn totals(id: &str, what: &str, runs: &[RunPair]) -> Result<Table, Error> {
     let on_device = on_device();
     let beside = |run: &ProgramRun| -> Vec<(String, f64)> {
         let stages = run.stages_ms().filter(|(name, _)| !on_device.contains(name));
@@ -117,7 +117,7 @@ fn totals(id: &str, what: &str, runs: &[Runs]) -> Result<Table, Error> {
     let columns = [what, "threads", "CPU alone", "p99", "with the device", "p99", "on the device"];
     let columns: Vec<&str> =
         columns.into_iter().chain(parts.iter().map(|(name, _)| name.as_str())).collect();
-    let row = |both: &Runs| {
+    let row = |both: &RunPair| {
         let total =
             |run: &ProgramRun| Ok::<_, Error>([run.total_ms("median")?, run.total_ms("p99")?]);
         let [scalar, device] = [total(&both.scalar)?, total(&both.device)?];
@@ -134,7 +134,7 @@ fn totals(id: &str, what: &str, runs: &[Runs]) -> Result<Table, Error> {
 }
 
 /// Times of each stage in each profile.
-fn stages(profiles: &[Runs]) -> Table {
+fn stages(profiles: &[RunPair]) -> Table {
     let row = |name: &str| {
         let times = profiles.iter().map(|both| Cell::Number(both.device.stage_ms(name), 3));
         TableRow::new([Cell::from(name)].into_iter().chain(times))

@@ -82,7 +82,7 @@ fn check_traced(case: &str, change: fn(Profile) -> Profile, point: [f32; 3], wan
 }
 
 #[test]
-fn rays_without_an_echo_still_free_space() {
+fn rays_ending_outside_still_free_space() {
     let same = |p: Profile| p;
     let short = |p: Profile| Profile { range_m: 9.0, ..p };
     check_traced("a return", same, [12.0, 0.0, 0.0], [40, 1]);

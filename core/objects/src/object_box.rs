@@ -23,7 +23,7 @@ raywake_core::params! {
         pub box_trim: f32 = 0.01, "", (0 to 0.2);
         /// Distance moved from which an object is long in the direction of its motion.
         pub box_along_motion_m: f64 = 1.0, "m", (above 0),
-            "Parked tracks of `kitti_raw_0005` move up to 0.16 m over its 60 sweeps.";
+            "Parked tracks of `kitti_raw_0005` move up to 0.16 m over 60 sweeps of it.";
         /// Step between the directions tried for a stationary object.
         pub box_step_rad: f32 = 0.035, "rad", (0.001 to 0.5);
         /// Distance from an edge below which closer does not count more.

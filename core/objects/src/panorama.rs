@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_through_a_window_does_not_pass() {
+    fn rays_through_a_window_do_not_count_as_passing() {
         let window = |beam, off: f32| (beam == 2 && off.abs() < 2.9).then_some(40.0);
         let panorama = scene(60.0, window);
         for beam in 0..BEAMS.len() {

@@ -18,8 +18,8 @@ pub struct ParameterSetting<'a> {
 pub enum AssignError {
     /// There is no parameter of this name, or not in this group.
     Unknown,
-    /// The value has the wrong type; it must be this.
-    WrongType(&'static str),
+    /// The value is invalid: it must be this.
+    InvalidValue(&'static str),
 }
 
 impl<'a> ParameterSetting<'a> {
@@ -49,6 +49,6 @@ impl Profile {
         let mut having = groups.iter().filter(|(_, has)| *has);
         let found = having.find(|(group, _)| to.group.is_none_or(|wanted| wanted == *group));
         let (group, _) = found.ok_or(AssignError::Unknown)?;
-        self.group_mut(group).set(to.name, to.value).map_err(AssignError::WrongType)
+        self.group_mut(group).set(to.name, to.value).map_err(AssignError::InvalidValue)
     }
 }

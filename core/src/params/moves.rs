@@ -14,10 +14,10 @@ crate::params! {
         /// Minimum P(moves) of anything reported as moving.
         pub moves_min: f32 = 0.4, "", (0 to 1),
             "The smallest of 0.3, 0.4 and 0.5 at which fewer than one in 2,000 returns of a \
-             static simulated street are moving. Precision and recall of columns on simulated \
-             streets of another seed than the weights (as for `could_move_min`; slow and plain, \
-             `vlp32x2`): 95.4 and 91.1, 96.2 and 97.5 % at 0.3; 95.8 and 90.3, 96.4 and 97.3 \
-             here; 96.2 and 89.4, 96.8 and 97.0 at 0.5.";
+             static simulated street are reported as moving. Precision and recall of columns on \
+             simulated streets of another seed than the weights (as for `could_move_min`; slow and \
+             plain, `vlp32x2`): 95.4 and 91.1, 96.2 and 97.5 % at 0.3; 95.8 and 90.3, 96.4 and \
+             97.3 here; 96.2 and 89.4, 96.8 and 97.0 at 0.5.";
         /// Logit without any cue.
         pub moves_bias: f32 = -5.87, "nat", (-100 to 100), FITTED;
         /// Weight of the evidence in excess of what the hypothesis test required.

@@ -65,7 +65,8 @@ impl History {
         let at = [column / first.side, column % first.side];
         let old = |past: &&PastSweep| first.stamp_s - past.stamp_s >= since_s;
         let mut old = self.sweeps[..self.held].iter().filter(old).peekable();
-        let unseen = |past: &PastSweep| past.around(&first, at).is_some_and(|l| levels & l == 0);
+        let unseen =
+            |past: &PastSweep| past.around(&first, at).is_some_and(|earlier| levels & earlier == 0);
         levels != 0 && old.peek().is_some() && old.all(unseen)
     }
 

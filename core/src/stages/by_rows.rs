@@ -12,14 +12,14 @@ use crate::params::ROW;
 use crate::team::{Workers, share};
 
 /// Rows that are not split further: up to 50 microseconds of work. Not measured in isolation.
-const ROWS_MIN: usize = 32;
+const PIECE_ROWS_MAX: usize = 32;
 
 /// See [`super::background_filter::background_filter`].
 pub fn background_filter(s: &mut Storage, workers: &dyn Workers) {
     let Storage { sweep, filter_table, columns_before, foreground_marks, .. } = s;
     let side = sweep.side as usize;
     let marks = &mut foreground_marks[..side * side];
-    share(workers, ROWS_MIN, 0..side, marks, side, &|rows, marks| {
+    share(workers, PIECE_ROWS_MAX, 0..side, marks, side, &|rows, marks| {
         mark_by_bytes(sweep, filter_table, columns_before, rows.start * side, marks);
     });
 }
@@ -31,7 +31,7 @@ pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
     let (foreground, before, now) = (&*s.foreground, &*s.columns_before, &*s.columns_now);
     share(
         workers,
-        ROWS_MIN,
+        PIECE_ROWS_MAX,
         0..count,
         &mut s.pair_cost[..count * ROW],
         ROW,
@@ -55,7 +55,7 @@ pub fn window_minima(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, simd) = (&*s.pair_cost, workers.simd());
-    share(workers, ROWS_MIN, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
+    share(workers, PIECE_ROWS_MAX, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
         simd.run(
             #[inline(always)]
             move || window(sweep, &foreground[rows], index, pairs, least),
@@ -69,13 +69,22 @@ pub fn expectation(s: &mut Storage, workers: &dyn Workers) {
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, flow, targets) = (&*s.pair_cost, &*s.flow, &*s.target_energy);
     let (least, simd) = (&*s.min_cost, workers.simd());
-    share(workers, ROWS_MIN, 0..count, &mut s.proposal[..count], 1, &move |rows, proposal| {
-        let (of_rows, least) = (&foreground[rows.clone()], &least[rows]);
-        simd.run(
-            #[inline(always)]
-            move || {
-                expectation_by_rings(sweep, of_rows, index, pairs, flow, targets, least, proposal);
-            },
-        );
-    });
+    share(
+        workers,
+        PIECE_ROWS_MAX,
+        0..count,
+        &mut s.proposal[..count],
+        1,
+        &move |rows, proposal| {
+            let (of_rows, least) = (&foreground[rows.clone()], &least[rows]);
+            simd.run(
+                #[inline(always)]
+                move || {
+                    expectation_by_rings(
+                        sweep, of_rows, index, pairs, flow, targets, least, proposal,
+                    );
+                },
+            );
+        },
+    );
 }

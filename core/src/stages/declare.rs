@@ -265,8 +265,9 @@ macro_rules! buffers {
 /// the module, its kernel the entry point of that name. An argument is
 /// `[mut] [atomic|quads] BUFFER`, `[mut] NAME is BUFFER` if the stage serves several buffers, or
 /// `list BUFFER` if `counters` holds its number of elements. `scalar: FUNCTION` names what the
-/// scalar backend runs instead of the twin on the whole [`Storage`], `[ENTRY: GROUPS, ..]` the
-/// entry points if there are several.
+/// scalar backend runs instead of the twin on the whole [`Storage`], `on_cpus: (ENTRY, GROUPS)`
+/// after it the kernel for devices that are CPUs, `[ENTRY: GROUPS, ..]` the entry points if there
+/// are several.
 macro_rules! stage {
     (
         $name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, $groups:expr

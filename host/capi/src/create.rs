@@ -94,7 +94,7 @@ fn assign(profile: &mut Profile, setting: &str) -> Result<(), Refusal> {
     let to = ParameterSetting::parse(setting).ok_or_else(|| refuse("it must be ", "NAME=VALUE"))?;
     profile.assign(&to).map_err(|e| match e {
         AssignError::Unknown => refuse("there is no such parameter", ""),
-        AssignError::WrongType(requirement) => refuse("it must be ", requirement),
+        AssignError::InvalidValue(requirement) => refuse("it must be ", requirement),
     })
 }
 

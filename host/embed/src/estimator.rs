@@ -198,9 +198,9 @@ impl FlowEstimator {
         let [now, before] = &self.sweeps;
         let sweep =
             Sweep { stamp_s: place.stamp_s, points: now.points(), world_from_vehicle: pose, twist };
-        let machine = StepContext { backend: &mut self.backend, team, timer: &mut () };
+        let context = StepContext { backend: &mut self.backend, team, timer: &mut () };
         let room = Output { columns: self.columns, points: self.taken };
-        let step = self.pipeline.step(&self.setup, machine, &sweep, before.points(), room);
+        let step = self.pipeline.step(&self.setup, context, &sweep, before.points(), room);
         let output = step.unwrap_or_else(|never| match never {});
         if let (Some(objects), Some(last)) = (&mut self.objects, self.before) {
             let LastSweep { stamp_s, pose: world_from_vehicle, twist } = last;

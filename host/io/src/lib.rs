@@ -4,8 +4,8 @@
 //!
 //! | module | subject |
 //! |---|---|
-//! | [`source`] | sweeps and poses of KITTI, Argoverse 2, folders of clouds, simulated drives |
-//! | [`sink`] | feather tables, Argoverse 2 submissions, each file whole or absent |
+//! | [`source`] | sweeps and poses: data sets, ROS recordings, captures, clouds, simulated drives |
+//! | [`sink`] | tables, clouds, MCAP, Argoverse 2 submissions; each file whole or absent |
 //! | [`error`] | errors in files and options, and their exit codes |
 
 pub mod error;

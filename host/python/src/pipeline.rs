@@ -66,7 +66,7 @@ fn set(profile: &mut Profile, path: &str, value: &Bound<'_, PyAny>) -> PyResult<
     };
     profile.assign(&ParameterSetting::new(path, value)).map_err(|e| match e {
         AssignError::Unknown => PyValueError::new_err(format!("there is no parameter {path:?}")),
-        AssignError::WrongType(requirement) => {
+        AssignError::InvalidValue(requirement) => {
             PyValueError::new_err(format!("{path} must be {requirement}"))
         }
     })

@@ -47,7 +47,7 @@ pub struct LiveArgs {
     /// one revolution of the sensor]
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub deadline: Option<Duration>,
-    /// Also track objects: a box with a number, a velocity and a class for each
+    /// Also track objects: a box with an ID, a velocity and a class for each
     #[arg(long)]
     pub objects: bool,
     /// Stop after this many sweeps

@@ -53,7 +53,7 @@ pub struct TrackArgs {
     /// Also estimate at every sweep, from a sliding window
     #[arg(long)]
     pub fixed_lag: bool,
-    /// Output folder: `tracks.feather`, `clouds` and `summary.json`
+    /// Output folder: `tracks.feather`, `returns`, `clouds` and `summary.json`
     #[arg(short, long, value_name = "DIR", help_heading = "Results")]
     pub out: Option<PathBuf>,
     /// Also draw the tracks of each sweep from above: DIR/png/FRAME.png

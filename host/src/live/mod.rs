@@ -138,8 +138,8 @@ impl Plan<'_> {
         }
         let LiveRig { rig, notes } = sensor.learn(&first.data, &args.place.options())?;
         note(args.quiet, &notes)?;
-        let turn = Duration::from_nanos(first.period_ns as u64);
-        let deadline = args.deadline.unwrap_or(turn);
+        let period = Duration::from_nanos(first.period_ns as u64);
+        let deadline = args.deadline.unwrap_or(period);
         let backend = &args.flow.backend;
         let timeout = backend.timeout.min(deadline * DEVICE_DEADLINES);
         let backend = BackendChoice { timeout, ..backend.clone() };
@@ -157,7 +157,7 @@ impl Plan<'_> {
         let worker = Worker {
             profile: &self.profile,
             rig: &rig,
-            turn,
+            period,
             deadline,
             drive,
             objects: self.objects()?,

@@ -35,7 +35,7 @@ const ALIVE: Duration = Duration::from_secs(1);
 pub struct Worker<'a> {
     pub profile: &'a Profile,
     pub rig: &'a Rig,
-    pub turn: Duration,
+    pub period: Duration,
     pub deadline: Duration,
     pub drive: Drive,
     pub objects: Option<LiveObjects<'a>>,
@@ -91,7 +91,7 @@ impl Worker<'_> {
         sweeps: &Handover<LiveSweep>,
         spare: LiveSweep,
     ) -> Result<LiveEnd, RunError> {
-        let (times, most) = ([self.turn, self.deadline], self.most);
+        let (times, most) = ([self.period, self.deadline], self.most);
         let mut running = LiveRun {
             statistics: LiveStatistics::new(),
             now: LiveSweep::of(receiver.sensor()),
@@ -169,7 +169,7 @@ impl LiveRun<'_> {
     /// Processes one sweep, from its returns to the datagrams.
     fn sweep(&mut self) -> Result<(), RunError> {
         let LiveRun { worker, statistics, now, last, paired, frames, .. } = self;
-        let period_ns = worker.turn.as_nanos() as u64;
+        let period_ns = worker.period.as_nanos() as u64;
         let counts = &mut statistics.counts;
         counts.incomplete += u64::from(now.lost_packets > 0);
         counts.missing += now.data.dropped.sweeps_before;

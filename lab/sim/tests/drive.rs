@@ -220,7 +220,7 @@ fn movers() -> Scene {
 }
 
 #[test]
-fn overhanging_structure_is_not_an_object() {
+fn airborne_clutter_is_not_an_object() {
     for clutter in Clutter::ALL {
         let options = Options { clutter, ..options(Ego::Straight { speed: 8.0 }, 20) };
         let [one, two] =

@@ -46,7 +46,7 @@ impl Tally {
         counted.removed += u64::from(label == MOVING);
     }
 
-    /// Shares of inspected returns: static kept, dynamic removed, IoU.
+    /// Shares of examined returns: static kept, dynamic removed, IoU.
     fn shares(&self) -> [f64; 3] {
         let [still, moving] = self.0;
         let share = |part: u64, of: u64| part as f64 / of.max(1) as f64;
@@ -63,9 +63,9 @@ impl Tally {
         let mean = (kept * removed).sqrt();
         let all = 100.0 * moving.removed as f64 / moving.all.max(1) as f64;
         format!(
-            "{} static and {} moving returns, {} and {} of them inspected\n\
+            "{} static and {} moving returns, {} and {} of them examined\n\
              static kept {kept:.2} %, dynamic removed {removed:.2} %, geometric mean {mean:.2} %, \
-             IoU {iou:.2} %\nremoved of all moving returns: {all:.2} %\n",
+             IoU {iou:.2} %\nof all moving returns, removed: {all:.2} %\n",
             still.all, moving.all, still.examined, moving.examined
         )
     }

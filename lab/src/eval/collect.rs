@@ -83,7 +83,7 @@ pub struct Collector<'a> {
     /// Columns of the first sweep in the second's window, where the filter sees them.
     before: Vec<Column>,
     /// Whether each column of the first sweep's window has flow and is not reported as moving.
-    is_static: Vec<bool>,
+    reported_static: Vec<bool>,
 }
 
 impl<'a> Collector<'a> {
@@ -98,8 +98,9 @@ impl<'a> Collector<'a> {
         margin_m: f64,
     ) -> Collector<'a> {
         let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
-        let (before, is_static) = (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
-        Collector { profile, rig, filter, view, margin_m, objects, grid, before, is_static }
+        let (before, reported_static) =
+            (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
+        Collector { profile, rig, filter, view, margin_m, objects, grid, before, reported_static }
     }
 
     /// Edge of a column, m.
@@ -126,7 +127,7 @@ impl<'a> Collector<'a> {
         shift(&step, &self.grid.columns, &mut self.before);
         let present = self.present(seen);
         let mut rows = Vec::with_capacity(seen.columns.len());
-        self.is_static.fill(false);
+        self.reported_static.fill(false);
         for flow in &seen.columns {
             let column = |window: &Window| {
                 let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
@@ -142,7 +143,7 @@ impl<'a> Collector<'a> {
             let score = score(&step, &self.filter, &self.before, column);
             let row = self.row(seen, flow, owner, occupied.count_ones() as u8, score);
             let row = Row { below: hit == Some(None) && owner.is_some(), ..row };
-            self.is_static[here] = !row.is_reported_moving();
+            self.reported_static[here] = !row.is_reported_moving();
             rows.push(row);
         }
         rows
@@ -154,7 +155,7 @@ impl<'a> Collector<'a> {
     pub fn returns_reported_moving(&self, seen: &PairData) -> Vec<bool> {
         let moving = |(flow, &column): (&PointFlow, &u32)| {
             let [x, y] = flow.velocity_world_mps.map(f64::from);
-            let with_column = column == NONE || !self.is_static[column as usize];
+            let with_column = column == NONE || !self.reported_static[column as usize];
             x.hypot(y) >= MOVING_MPS && with_column
         };
         seen.points.iter().zip(&self.grid.of_point).map(moving).collect()

@@ -39,7 +39,7 @@ struct Candidate {
 
 /// The sweeps drawn: by the error of their raw flow, then those with most moving tracklets while
 /// the vehicle is stationary (figure 3.10) and while it drives (figures 3.11 and 3.12).
-const PICTURES: [&str; 4] = ["worst", "best", "busiest stationary", "busiest driving"];
+const PICTURES: [&str; 4] = ["worst", "best", "busiest standing", "busiest driving"];
 /// A vehicle slower than this is stationary, m/s: twice the speed that poses with an error of 1 cm
 /// on every sweep give a stationary one.
 const STATIONARY_MPS: f64 = 0.3;
@@ -84,7 +84,7 @@ impl Panels {
             let file = format!("{drive}-{}.png", what.replace(' ', "-"));
             let frame = c.seen.first.frame;
             let (panels, shows) = match *what {
-                "busiest stationary" => (
+                "busiest standing" => (
                     [c.raw(), c.tracklets(true)],
                     "Temporal scene flow while the vehicle is stationary, as in figure 3.10."
                         .to_string(),

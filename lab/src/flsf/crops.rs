@@ -1,7 +1,7 @@
-//! Lessons: squares around a cell of an object, with pairs drawn from them.
+//! Training samples: squares around a cell of an object, with pairs drawn from them.
 //!
 //! The text draws one pair of cells at a time. All encodings of a square cost little more than one,
-//! so a lesson takes all pairs of a square as wide as the search: each solid cell of an object with
+//! so a sample takes all pairs of a square as wide as the search: each solid cell of an object with
 //! the cell it went to and with one other, and one in a hundred of the background's cells likewise.
 
 use super::network::{CellPair, SEEN, TrainingSample};
@@ -14,7 +14,7 @@ use raywake_sim::Rng;
 const OF_BACKGROUND: f64 = 0.01;
 
 impl FlowPair {
-    /// A lesson around one of the pair's `sources`.
+    /// A sample around one of the pair's `sources`.
     pub fn sample(&self, source: usize, rng: &mut Rng) -> TrainingSample {
         let symmetry = Symmetry((rng.bits() & 7) as u8);
         let half = (SEARCH / 2) as i32;

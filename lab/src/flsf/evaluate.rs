@@ -1,11 +1,11 @@
-//! `raywake-lab eval flsf`: table 4.2 and figure 4.8, comparing occupancy constancy and learned
-//! features by one protocol on the same drives.
+//! `raywake-lab eval flsf`: table 4.2, figures 4.5 and 4.8, comparing occupancy constancy and
+//! learned features by one protocol on the same drives.
 
 use super::conclude::conclude;
 use super::matching::{Constancy, Features};
 use super::network::Flsf;
 use super::outcome::{Compared, Outcome, walk};
-use super::weights::TrainedParameters;
+use super::weights::TrainedWeights;
 use crate::train::recorded::Recorded;
 use raywake::args::Learned;
 use raywake::weight_files::WeightFiles;
@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let profile = Profile::dissertation();
     let learned = Learned { constancy: args.constancy.clone(), ..Learned::default() };
     let tables = WeightFiles::read(&learned, &profile)?.tables(&profile)?;
-    let trained = TrainedParameters::read(&args.weights, Flsf::new(false).numbers())?;
+    let trained = TrainedWeights::read(&args.weights, Flsf::new(false).numbers())?;
     let methods = (Constancy::new(tables), Features::new(trained.numbers));
     let mut outcome = Outcome::default();
     let mut rng = Rng::new(48);

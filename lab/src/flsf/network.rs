@@ -84,7 +84,7 @@ impl Flsf {
         numbers
     }
 
-    /// Mean losses of a lesson, for the pairs (4.6) and for the classes (4.7); adds the gradient of
+    /// Mean losses of a sample, for the pairs (4.6) and for the classes (4.7); adds the gradient of
     /// their sum (4.8) to `into`. `weights` are those of background and foreground.
     pub fn learn(
         &self,

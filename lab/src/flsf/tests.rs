@@ -4,7 +4,7 @@ use super::occupancy::{BORDER, OccupancyMap, SIDE, Symmetry, WIDE, wide_grid};
 use super::outcome::{Outcome, walk};
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
 use super::train::{Fit, Material};
-use super::weights::{self, TrainedParameters};
+use super::weights::{self, TrainedWeights};
 use crate::learning::Adam;
 use crate::scratch::Scratch;
 use crate::train::simulated::Simulated;
@@ -82,9 +82,9 @@ fn occupancy_of_a_square() {
     assert!(map.square([-50, 180], 60, Symmetry(0)).values.iter().all(|v| *v == 0.0));
 }
 
-/// The pairs of a lesson agree with the two maps, however the square is rotated.
+/// The pairs of a sample agree with the two maps, however the square is rotated.
 #[test]
-fn lessons_match_where_cells_went() {
+fn samples_match_where_cells_went() {
     let pair = pair();
     let mut rng = Rng::new(1);
     let half = (SEARCH / 2) as i32;
@@ -152,13 +152,13 @@ fn training_goes_on_where_it_was() {
 
     let out = scratch.path().join("weights");
     let (numbers, provenance) = (whole.numbers, "by hand".to_string());
-    let trained = TrainedParameters { numbers, provenance };
+    let trained = TrainedWeights { numbers, provenance };
     trained.write(&out).unwrap();
     let count = trained.numbers.len();
-    let again = TrainedParameters::read(&out, count).unwrap();
+    let again = TrainedWeights::read(&out, count).unwrap();
     assert!(again.numbers == trained.numbers && again.provenance == "by hand");
     let refused = |file: &std::path::Path, count: usize| {
-        TrainedParameters::read(file, count).map(|_| ()).unwrap_err().to_string()
+        TrainedWeights::read(file, count).map(|_| ()).unwrap_err().to_string()
     };
     assert!(refused(&out, 7).contains("another length"));
     assert!(refused(&file, 7).contains("raywake-flsf-weights"));

@@ -3,7 +3,7 @@
 use super::network::{D_MAX, FEATURES, Flsf, SCORES, TrainingSample};
 use super::occupancy::wide_grid;
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
-use super::weights::{self, TrainedParameters};
+use super::weights::{self, TrainedWeights};
 use crate::curve::{Curve, OperatingPoint};
 use crate::learning::Adam;
 use crate::train::inputs::{Inputs, Visit};
@@ -16,14 +16,14 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Lessons per step: two per thread.
+/// Samples per step: two per thread.
 const BATCH: usize = 4;
 /// Adam's rate at the first step; it falls linearly to zero. The text's 1e-6 with one pair and one
 /// map per step took two days on a GPU.
 const RATE: f32 = 3e-4;
 /// Steps between checkpoints and between lines of progress.
 const CHECKPOINT: u32 = 50;
-/// Lessons used to judge the network.
+/// Samples used to judge the network.
 const JUDGED: usize = 200;
 
 /// Options of `train flsf`.
@@ -37,7 +37,7 @@ pub struct Args {
     /// Results file to write.
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
-    /// Number of steps of four lessons.
+    /// Number of steps, of four samples each.
     #[arg(long, default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Checkpoint file to write, and to resume from if training was interrupted.
@@ -72,10 +72,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Counts { positive: sources, negative: 1 }.both(part, "cells of labelled objects", "")?;
     }
     let fitted = Fit::of(&training, args.inputs.seed, args.steps, args.checkpoint.as_deref())?;
-    let trained = TrainedParameters {
+    let trained = TrainedWeights {
         numbers: fitted.numbers,
         provenance: format!(
-            "raywake-lab train flsf, {}, {} steps of {BATCH} lessons",
+            "raywake-lab train flsf, {}, {} steps of {BATCH} samples",
             args.inputs.provenance(),
             args.steps
         ),
@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
 }
 
-/// A pair of sweeps and the cells around which lessons are centred.
+/// A pair of sweeps and the cells around which samples are centred.
 pub struct Material {
     pair: FlowPair,
     sources: Vec<usize>,
@@ -246,5 +246,5 @@ fn judge(pairs: &[Material], numbers: &[f32]) -> Curve {
             (-f64::from(d), p.matching, 1.0)
         }));
     }
-    Curve::of(rows.into_iter()).expect("lessons have matching pairs and others")
+    Curve::of(rows.into_iter()).expect("samples have matching pairs and others")
 }

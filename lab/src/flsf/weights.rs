@@ -14,14 +14,14 @@ const TRAINING: &[u8] = b"raywake-flsf-training 1\n";
 const PROVENANCE_MAX: usize = 10_000;
 
 /// Trained parameters, and their provenance.
-pub struct TrainedParameters {
+pub struct TrainedWeights {
     /// Parameters of the network.
     pub numbers: Vec<f32>,
     /// Command, inputs, steps.
     pub provenance: String,
 }
 
-impl TrainedParameters {
+impl TrainedWeights {
     /// Writes them.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let mut body: Vec<u8> = self.numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
@@ -30,12 +30,12 @@ impl TrainedParameters {
     }
 
     /// Reads `count` parameters. Fails if the file is damaged or from another network.
-    pub fn read(path: &Path, count: usize) -> Result<TrainedParameters, Error> {
+    pub fn read(path: &Path, count: usize) -> Result<TrainedWeights, Error> {
         let lengths = 4 * count..=4 * count + PROVENANCE_MAX;
         let body = checkpoint::read(path, WEIGHTS, 0, lengths)?;
         let (numbers, provenance) = body.split_at(4 * count);
         let provenance = String::from_utf8_lossy(provenance).into_owned();
-        Ok(TrainedParameters { numbers: floats(numbers), provenance })
+        Ok(TrainedWeights { numbers: floats(numbers), provenance })
     }
 }
 

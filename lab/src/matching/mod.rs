@@ -21,7 +21,8 @@ pub struct Args {
     #[arg(long, value_name = "SEED", conflicts_with = "drive")]
     simulated: Option<u64>,
     /// Whether sweeps still contain motion distortion; as the format defines it unless given.
-    #[arg(long, value_name = "true|false")]
+    #[arg(long, value_name = "on|off", hide_possible_values = true)]
+    #[arg(value_parser = clap::builder::BoolishValueParser::new())]
     deskew: Option<bool>,
     /// Use only the first sweeps.
     #[arg(short = 'n', value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..))]

@@ -20,8 +20,8 @@ pub struct Args {
     /// to OUT/argoverse; several are graded side by side.
     #[arg(long, value_name = "FOLDER")]
     estimate: Vec<PathBuf>,
-    /// Folder with the truth, LOG/NUMBER.feather; default: SPLIT_sceneflow_feather beside the
-    /// folder SPLIT of the log.
+    /// Folder with the truth, LOG/NUMBER.feather [default: SPLIT_sceneflow_feather beside the
+    /// folder SPLIT of the log].
     #[arg(long, value_name = "FOLDER")]
     truth: Option<PathBuf>,
     /// Also count returns from the ground; the challenge does not.

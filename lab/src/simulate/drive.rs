@@ -41,8 +41,8 @@ pub enum Motion {
 pub enum Poses {
     /// The exact ones.
     Exact,
-    /// With the errors of a satellite-aided inertial unit: reports on a clock of 10 ms, about 4 cm
-    /// of position and 0.2 degrees of heading that change slowly, and 1 cm on every sweep.
+    /// With the errors of a GNSS-aided inertial unit: reports on a clock of 10 ms, about 4 cm of
+    /// position and 0.2 degrees of heading that change slowly, and 1 cm on every sweep.
     Gnss,
 }
 

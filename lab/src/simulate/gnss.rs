@@ -1,4 +1,4 @@
-//! Errors of a satellite-aided inertial unit, as real poses have them.
+//! Errors of a GNSS-aided inertial unit, as real poses have them.
 //!
 //! - Clock: the unit reports every 10 ms, and a sweep gets the report nearest to its stamp. The
 //!   scanner's period is not a multiple of 10 ms (KITTI's is 103.6 ms), so the report is up to 5 ms

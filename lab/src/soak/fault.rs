@@ -20,7 +20,7 @@ pub const OVER: usize = 2;
 /// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Fault {
-    /// One sweep is lost; tracking goes on.
+    /// One sweep is lost; tracking continues.
     LostSweep,
     /// More sweeps are lost than tracking can bridge.
     Gap,
@@ -52,7 +52,7 @@ impl Fault {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Spoils the sweep that comes `after` sweeps after the middle one of its stretch. Returns
+    /// Corrupts the sweep that comes `after` sweeps after the middle one of its stretch. Returns
     /// whether there is a sweep at all.
     pub fn corrupt(
         self,

@@ -41,24 +41,24 @@ pub fn run(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// Outcome of a lesson.
+/// Outcome of training with an objective.
 struct Learned {
-    lesson: Objective,
+    objective: Objective,
     /// Encodings of the test digits.
     encodings: Vec<[f32; 2]>,
     /// Share of test digits classified correctly, for each digit and for all.
     right: [f64; CLASSES + 1],
 }
 
-/// Runs both lessons in parallel; also returns how long they took, s.
+/// Trains with both objectives in parallel; also returns how long they took, s.
 fn both(sets: &DigitSets, training: &Training) -> ([Learned; 2], f64) {
     let begin = std::time::Instant::now();
-    let learned = |lesson: Objective| {
-        let encoder = training.encoder(lesson, &sets.training);
+    let learned = |objective: Objective| {
+        let encoder = training.encoder(objective, &sets.training);
         let classifier = training.classifier(&encoder.of(&sets.training), &sets.training.labels);
         let encodings = encoder.of(&sets.test);
         let right = shares(&sets.test, &classifier.classify(&encodings));
-        Learned { lesson, encodings, right }
+        Learned { objective, encodings, right }
     };
     let both = std::thread::scope(|scope| {
         let features = scope.spawn(|| learned(Objective::Features));
@@ -111,7 +111,7 @@ fn conclude(
     let section = report.section("Table 4.1");
     section.table(table(both));
     for (learned, id) in both.iter().zip(["figure-4-2", "figure-4-3"]) {
-        let title = format!("Encodings of the test digits: {}", learned.lesson);
+        let title = format!("Encodings of the test digits: {}", learned.objective);
         report.section(&title).chart(figure(id, learned, &sets.test));
     }
     report.write(&args.out)
@@ -143,6 +143,6 @@ fn figure(id: &str, learned: &Learned, digits: &Digits) -> Chart {
         let name = digit.to_string();
         plot.series.push(Series { name, points, style: Style::Dots, marks: Vec::new() });
     }
-    let caption = format!("One dot per test digit: {}", learned.lesson);
+    let caption = format!("One dot per test digit: {}", learned.objective);
     Chart::new(id, &caption, Plot::Lines(plot))
 }

@@ -97,7 +97,7 @@ impl Training {
     }
 
     /// Trains an encoder.
-    pub fn encoder(&self, lesson: Objective, digits: &Digits) -> DigitEncoder {
+    pub fn encoder(&self, objective: Objective, digits: &Digits) -> DigitEncoder {
         let widths: Vec<usize> = [digits.pixels]
             .into_iter()
             .chain(self.hidden.iter().map(|w| usize::from(*w)))
@@ -107,7 +107,7 @@ impl Training {
         let own = encoder.numbers();
         let mut rng = Rng::split(self.seed, 2);
         let (mut network, mut numbers) = (encoder.clone(), encoder.drawn(&mut rng));
-        if lesson == Objective::Autoencoder {
+        if objective == Objective::Autoencoder {
             let back: Vec<usize> = widths.into_iter().rev().collect();
             let decoder = dense(&back, Activation::Sigmoid);
             numbers.extend(decoder.drawn(&mut rng));
@@ -117,7 +117,7 @@ impl Training {
         by_class.retain(|indices| !indices.is_empty());
         let mut state = Adam::new(numbers.len());
         for step in 0..self.steps {
-            let mut slope = match lesson {
+            let mut slope = match objective {
                 Objective::Autoencoder => restored(&network, &numbers, digits, &mut rng),
                 Objective::Features => {
                     pair_gradient(&network, &numbers, digits, &by_class, &mut rng)

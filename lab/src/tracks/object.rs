@@ -45,7 +45,7 @@ pub struct Seen {
 }
 
 /// Finds on which sides neighbouring rays pass the wanted returns of a sweep.
-pub fn mark_passing_rays(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
+pub fn mark_passed_returns(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
     let ray = |s: &Seen| (s.sensor, [0.0; 3], (s.at - s.from).as_vec3().to_array());
     let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
     panorama.look(&PassingParams::DEFAULT, seen, ray, wanted, |s, passed| s.passed = passed);

@@ -1,6 +1,6 @@
 //! Labelled objects of a recorded drive.
 
-use super::object::{Moment, Object, Seen, centroid, mark_passing_rays};
+use super::object::{Moment, Object, Seen, centroid, mark_passed_returns};
 use crate::labels::{self, Labels, Motion, Track, Trajectory, trajectories, turn};
 use glam::DVec3;
 use raywake_core::pose::Pose;
@@ -76,7 +76,7 @@ fn gather(
 ) {
     let seen = |p| seen(clock, rig, sweep, p);
     let mut seen: Vec<Seen> = sweep.points.iter().filter_map(seen).collect();
-    mark_passing_rays(&mut seen, |_| true);
+    mark_passed_returns(&mut seen, |_| true);
     for ((track, trajectory), gathered) in labels.tracks.iter().zip(trajectories).zip(gathered) {
         let (Some(labelled), Some(state)) =
             (track.boxes.get(&sweep.frame), trajectory.at(sweep.frame))

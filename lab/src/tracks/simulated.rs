@@ -1,6 +1,6 @@
 //! Objects of simulated drives past parked and moving traffic, seen by four HDL-32E.
 
-use super::object::{Moment, Object, Seen, mark_passing_rays};
+use super::object::{Moment, Object, Seen, mark_passed_returns};
 use crate::labels::{Kind, kind, turn};
 use crate::simulate::truth::class_name;
 use glam::DVec3;
@@ -231,7 +231,7 @@ fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>)
         let from = pose.transform(rig.sensors[point.sensor as usize].translation);
         all.push(Seen { at, from, time_s, sensor: point.sensor as u8, passed: [false; 2] });
     }
-    mark_passing_rays(&mut all, |n| sweep.truth[n].object != 0);
+    mark_passed_returns(&mut all, |n| sweep.truth[n].object != 0);
     for (one, truth) in all.into_iter().zip(&sweep.truth) {
         if truth.object != 0 {
             seen.entry(truth.object).or_default().push(one);

@@ -338,10 +338,10 @@ fn constant_twist(before_from_now: &Pose, dt_s: f64) -> Twist {
 
 /// Time between two stamps: rounded to whole revolutions if close, as stamps are often coarser.
 fn duration_s(rig: &Rig, between_s: f64) -> f64 {
-    let turn_s = span_s(rig).filter(|turn_s| *turn_s > 0.0).unwrap_or(between_s);
-    let turns = between_s / turn_s;
-    let whole = libm::round(turns);
-    if whole > 0.0 && (turns - whole).abs() < WHOLE { whole * turn_s } else { between_s }
+    let period_s = span_s(rig).filter(|period_s| *period_s > 0.0).unwrap_or(between_s);
+    let periods = between_s / period_s;
+    let whole = libm::round(periods);
+    if whole > 0.0 && (periods - whole).abs() < WHOLE { whole * period_s } else { between_s }
 }
 
 #[cfg(test)]

@@ -54,7 +54,10 @@ pub(super) fn reach(first: DVec3, pose: &Pose) -> Result<(), String> {
     let away = pose.translation - first;
     match pose.rotation.is_finite() && within(away, REACH_MAX_M) {
         true => Ok(()),
-        false => Err(format!("impossibly far, {:.3e} m from the first pose", away.length())),
+        false => Err(format!(
+            "impossible: {:.3e} m from the first pose, or a rotation that is not finite",
+            away.length()
+        )),
     }
 }
 

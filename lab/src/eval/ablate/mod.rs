@@ -15,7 +15,7 @@ use raywake::weight_files::WeightFiles;
 use raywake_io::Error;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use variants::{AUTHOR, BASE, ParameterSource, VARIANTS, Variant};
+use variants::{AUTHOR, BASE, VARIANTS, Variant, WeightSource};
 
 /// `raywake-lab ablate`.
 #[derive(clap::Args)]
@@ -68,12 +68,12 @@ fn settings(variant: &Variant, base: &Settings) -> Result<Settings, Error> {
     let profile = variant.profile(&base.profile);
     profile.check().map_err(|e| Error::Usage(format!("{} must be {}", e.field, e.requirement)))?;
     let weights = match variant.numbers {
-        ParameterSource::Base => base.weights.clone(),
-        ParameterSource::NoFilter => base.weights.clone().without_filter(),
-        ParameterSource::NoEncoder => base.weights.clone().without_encoder(),
-        ParameterSource::Author => base.weights.clone().with_constancy(AUTHOR),
-        ParameterSource::AsPrinted => WeightFiles::read(&Learned::default(), &profile)?,
-        ParameterSource::AsPrintedAuthor => {
+        WeightSource::Base => base.weights.clone(),
+        WeightSource::NoFilter => base.weights.clone().without_filter(),
+        WeightSource::NoEncoder => base.weights.clone().without_encoder(),
+        WeightSource::Author => base.weights.clone().with_constancy(AUTHOR),
+        WeightSource::AsPrinted => WeightFiles::read(&Learned::default(), &profile)?,
+        WeightSource::AsPrintedAuthor => {
             WeightFiles::read(&Learned::default(), &profile)?.with_constancy(AUTHOR)
         }
     };

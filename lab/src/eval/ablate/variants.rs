@@ -4,7 +4,7 @@ use raywake_core::params::{Frame, Profile};
 
 /// Source of a variant's learned parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ParameterSource {
+pub enum WeightSource {
     /// Those of the base.
     Base,
     /// Those of the base, without a background filter.
@@ -31,7 +31,7 @@ pub struct Variant {
     pub what: &'static str,
     change: fn(Profile) -> Profile,
     /// Its learned parameters.
-    pub numbers: ParameterSource,
+    pub numbers: WeightSource,
 }
 
 /// Name of the variant without a change.
@@ -45,12 +45,12 @@ impl Variant {
 
     /// Whether nothing is changed: in every series one variant equals the base.
     pub fn is_base(&self, base: &Profile) -> bool {
-        self.numbers == ParameterSource::Base && self.profile(base) == *base
+        self.numbers == WeightSource::Base && self.profile(base) == *base
     }
 }
 
 const fn of(name: &'static str, what: &'static str, change: fn(Profile) -> Profile) -> Variant {
-    Variant { name, what, change, numbers: ParameterSource::Base }
+    Variant { name, what, change, numbers: WeightSource::Base }
 }
 
 fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
@@ -73,10 +73,10 @@ pub const VARIANTS: [Variant; 26] = [
     of("rounds-6", "6 rounds", |p| Profile { em_rounds: 6, ..p }),
     of("rounds-20", "20 rounds", |p| Profile { em_rounds: 20, ..p }),
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
-    Variant { numbers: ParameterSource::NoFilter, ..of("filter-off", "every solid column", |p| p) },
-    Variant { numbers: ParameterSource::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
+    Variant { numbers: WeightSource::NoFilter, ..of("filter-off", "every solid column", |p| p) },
+    Variant { numbers: WeightSource::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
     Variant {
-        numbers: ParameterSource::Author,
+        numbers: WeightSource::Author,
         ..of("author-constancy", "the author's constants", |p| p)
     },
     of("sensor-frame", "sensor frame, our constants, whole cells", |p| Profile {
@@ -85,11 +85,11 @@ pub const VARIANTS: [Variant; 26] = [
         ..p
     }),
     Variant {
-        numbers: ParameterSource::AsPrinted,
+        numbers: WeightSource::AsPrinted,
         ..of("dissertation", "chapter 3 as printed", |_| Profile::dissertation())
     },
     Variant {
-        numbers: ParameterSource::AsPrintedAuthor,
+        numbers: WeightSource::AsPrintedAuthor,
         ..of("dissertation-author", "as printed, the author's constants", |_| {
             Profile::dissertation()
         })

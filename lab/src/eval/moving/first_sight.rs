@@ -75,9 +75,9 @@ impl FirstSights {
             "Never",
             "Median, s",
             "90 %, s",
-            "Half: never",
-            "Half: median, s",
-            "Half: 90 %, s",
+            "Half of it: never",
+            "Half of it: median, s",
+            "Half of it: 90 %, s",
         ];
         let caption = "Time from the first sight of a mover, a solid column in view while it \
             moves, until it is reported as moving: one of its columns, or half of them.";

@@ -21,7 +21,8 @@ fn movers_are_found_and_little_else() {
     let out = evaluated(&scratch, "kitti_raw_0005", &["-n", "40", "--pairs"]);
     let verdict = |of: &str, column: &str| figure(&out, "moving-or-not", &[of, "labels"], column);
     let flow = |column: &str| figure(&out, "table-3-1", &["All labelled", "moving"], column);
-    let late = |class: &str| figure(&out, "first-sight", &["labels", class], "Half: median, s");
+    let late =
+        |class: &str| figure(&out, "first-sight", &["labels", class], "Half of it: median, s");
     let mut wrong = Vec::new();
     for (what, value, least, most) in [
         ("precision of columns", verdict("columns", "Precision, %"), 76.0, 100.0),

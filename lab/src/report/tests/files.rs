@@ -191,7 +191,7 @@ fn odd_values_are_drawn_or_left_out() {
 }
 
 #[test]
-fn misfits_are_refused_by_name() {
+fn invalid_contents_are_refused_by_name() {
     let folder = Scratch::new();
     let refused = |fill: &dyn Fn(&mut Section)| {
         let mut report = Report::new("t", "");

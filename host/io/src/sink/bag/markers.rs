@@ -22,7 +22,7 @@ pub(super) fn cube(stamp_ns: u64, object: &TrackedObject) -> Vec<u8> {
     [0, BOX_SHOWN_NS].into_iter().for_each(|n| cdr.word(n));
     cdr.byte(0);
     cdr.word(0);
-    end_marker(&mut cdr);
+    finish_marker(&mut cdr);
     cdr.message()
 }
 
@@ -44,12 +44,12 @@ pub(super) fn lines(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
         let ends = [[*x, *y], [x + AHEAD_S * u, y + AHEAD_S * v]];
         ends.into_iter().for_each(|[x, y]| cdr.doubles([x.into(), y.into(), 0.0]));
     }
-    end_marker(&mut cdr);
+    finish_marker(&mut cdr);
     cdr.message()
 }
 
 /// The rest of a marker without point colours, texture, text or mesh.
-fn end_marker(cdr: &mut Cdr) {
+fn finish_marker(cdr: &mut Cdr) {
     cdr.word(0);
     cdr.text("");
     cdr.header(0, "");

@@ -147,7 +147,7 @@ impl Streams {
             Some(described) => {
                 format!("nor of the {} described by a file next to it", described.name())
             }
-            None => "and Ouster's need the sensor's metadata (NAME.json for NAME.pcap), an \
+            None => "and Ouster's need the sensor's metadata (NAME.json next to NAME.pcap), an \
                      HDL-64E's its calibration (NAME.xml)"
                 .into(),
         };
@@ -185,9 +185,9 @@ pub(super) fn notes(stream: &Stream, counts: &FrameCounts) -> Vec<String> {
         ("truncated or damaged frames".into(), counts.cut),
         ("frames of unknown link types".into(), counts.unknown_link),
     ];
-    let described = all.into_iter().filter(|(_, count)| *count > 0);
+    let nonzero = all.into_iter().filter(|(_, count)| *count > 0);
     let mut notes: Vec<String> =
-        described.map(|(what, count)| format!("left out: {what} ({count})")).collect();
+        nonzero.map(|(what, count)| format!("left out: {what} ({count})")).collect();
     if counts.ends_early {
         notes.push("the file ends within a frame".into());
     }

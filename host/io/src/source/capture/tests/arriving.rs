@@ -98,7 +98,7 @@ fn wrong_check_sums_are_counted() {
 
 /// A sensor that stands still, and one whose clock is set.
 #[test]
-fn incomplete_revolutions_are_bounded() {
+fn endless_revolutions_are_bounded() {
     let mut still = turns(0..130);
     let stuck = (0..2000).map(|n| {
         let mut packet = vlp16(129);
@@ -129,12 +129,12 @@ fn nonsense_is_counted() {
 /// Damages a quarter of the packets of a sensor.
 pub(super) fn corrupt(sensor: &LiveSensor, packets: &[Vec<u8>]) {
     let mut random = Random(20);
-    let corrupt = |packet: &Vec<u8>| match random.below(4) {
+    let maybe_damage = |packet: &Vec<u8>| match random.below(4) {
         0 => damaged(packet, &mut random),
         _ => packet.clone(),
     };
-    let corrupt_some: Vec<Vec<u8>> = packets.iter().map(corrupt).collect();
-    let (live, counts) = assembled(sensor, &corrupt_some);
+    let corrupted: Vec<Vec<u8>> = packets.iter().map(maybe_damage).collect();
+    let (live, counts) = assembled(sensor, &corrupted);
     assert_eq!(counts.packets + counts.foreign, packets.len() as u64);
     assert!(counts.foreign > packets.len() as u64 / 40 && !live.is_empty(), "{counts:?}");
     assert!(live.iter().all(|sweep| sweep.points.len() <= sensor.returns_max()));
