@@ -188,7 +188,7 @@ pub trait Parameters {
 /// let mut search = SearchParams { returns: 6, ..SearchParams::DEFAULT };
 /// assert_eq!(search.within_bounds(), Ok(()));
 /// search.set("reach_m", Value::Number(-1.0)).unwrap();
-/// assert_eq!(search.within_bounds().unwrap_err().must, "above 0, at most 100");
+/// assert_eq!(search.within_bounds().unwrap_err().requirement, "above 0, at most 100");
 /// ```
 ///
 /// Each line is a documented field: type, default, unit ("" for a ratio), range, and the reason for
