@@ -165,7 +165,7 @@ class Same(unittest.TestCase):
             self.assertAlmostEqual(recording.rig.ground, -1.7)
             last = recording[-1]
             self.assertIsNone(last.pose)
-            with self.assertRaisesRegex(ValueError, "poses are given"):
+            with self.assertRaisesRegex(ValueError, "poses must be given"):
                 raywake.Pipeline(rig=recording.rig).step(last)
             self.assertEqual(last.points.tobytes(), returns["xyz"].tobytes())
             self.assertEqual((len(last), last.time.shape), (len(returns), last.intensity.shape))
