@@ -58,7 +58,7 @@ use worker::{LiveEnd, Worker};
 const PORT: u16 = 2368;
 /// Wait after the last packet of a replay, for packets still on their way.
 const REPLAY_TAIL: Duration = Duration::from_millis(300);
-/// How often to check for the first sweep, and how long until the user is told that there is none.
+/// How often to check for the first sweep, and how long until a message says that there is none.
 const POLL: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_secs(5);
 /// A device has this many deadlines to answer.
