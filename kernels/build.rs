@@ -108,8 +108,8 @@ fn contradiction(
             return Some(format!("writes `{name}`, which its stage only reads"));
         }
         let (found, wanted) = (bound.stride?, prelude::stride(argument)?);
-        let told = || format!("sees {found} bytes per element of `{name}`, core has {wanted}");
-        (found != wanted).then(told)
+        let mismatch = || format!("sees {found} bytes per element of `{name}`, core has {wanted}");
+        (found != wanted).then(mismatch)
     })
 }
 

@@ -71,8 +71,8 @@ fn every_call_of_the_set_up() {
         for result in [OUT_OF_HOST_MEMORY, OUT_OF_DEVICE_MEMORY, LOST] {
             let o = run(&t, &format!("{name} 1 {result}"), &[]);
             assert_eq!(o.code, Some(5), "{name} {result}: {}{}", o.stdout, o.stderr);
-            let told = [*name, "heap cannot hold", "device lost during"];
-            assert!(told.iter().any(|text| o.stderr.contains(text)), "{name}: {}", o.stderr);
+            let reported = [*name, "heap cannot hold", "device lost during"];
+            assert!(reported.iter().any(|text| o.stderr.contains(text)), "{name}: {}", o.stderr);
         }
     }
     run(&t, &format!("vkMapMemory 1 {NULL}"), &[]).failed(5, &["vkMapMemory"]);
@@ -150,7 +150,7 @@ fn the_scalar_backend_takes_over_during_a_run() {
         assert_eq!(wanted.len(), 3 * (SWEEPS - 1 - failing));
         // Two programs have run before the first sweep.
         let call = failing + 3;
-        for (n, (name, result, told)) in [
+        for (n, (name, result, reported)) in [
             ("vkQueueSubmit", LOST, "device lost during `flow`, reported by vkQueueSubmit"),
             ("vkWaitForFences", LOST, "device lost during `flow`, reported by vkWaitForFences"),
             ("vkWaitForFences", TIMEOUT, "`flow` did not finish within 10s"),
@@ -162,8 +162,10 @@ fn the_scalar_backend_takes_over_during_a_run() {
         {
             let fault = format!("{name} {call} {result}");
             let (out, s, stderr) = results(&format!("{failing} {n}"), &fault, 0);
-            assert!(s["device_failure"].as_str().unwrap().contains(told), "{fault}: {s}");
-            assert!(stderr.contains(told) && stderr.contains("continuing on the scalar backend"));
+            assert!(s["device_failure"].as_str().unwrap().contains(reported), "{fault}: {s}");
+            assert!(
+                stderr.contains(reported) && stderr.contains("continuing on the scalar backend")
+            );
             assert_eq!(tables(&out, failing), wanted, "{fault}");
             // Both backends are held then.
             assert!(s["host_bytes"].as_u64() > host_bytes.map(|bytes| 2 * bytes), "{fault}: {s}");

@@ -121,8 +121,8 @@ fn digest(t: &Temp, program: &Path, mode: RunMode, more: &[&str]) -> String {
     let on_device = matches!(mode, RunMode::Vulkan(..));
     assert_eq!(s["backend"], if on_device { "vulkan" } else { "scalar" });
     if let (RunMode::Vulkan(width, _), Some(device)) = (mode, s["device"].as_str()) {
-        let told = !device.starts_with("llvmpipe") || device.contains(&format!("{width} bits"));
-        assert!(told, "{device} for {width} bits");
+        let reported = !device.starts_with("llvmpipe") || device.contains(&format!("{width} bits"));
+        assert!(reported, "{device} for {width} bits");
     }
     assert!(number("device_bytes") <= DEVICE_BYTES, "{s}");
     assert!(number("vulkan_allocations") <= 3, "{s}");
@@ -222,8 +222,8 @@ fn instruction_sets() {
     let (wanted, widest) = run(&[]);
     assert_eq!(widest, Simd::widest().name());
     for simd in Simd::available() {
-        let (found, told) = run(&["--simd", simd.name()]);
-        assert_eq!((found, told), (wanted.clone(), simd.name().into()));
+        let (found, reported) = run(&["--simd", simd.name()]);
+        assert_eq!((found, reported), (wanted.clone(), simd.name().into()));
     }
     let mut command = RunMode::Scalar.command(own(), "run", &t.path().join("drive"));
     let refused = Outcome::of(command.args(["--simd", "avx3"]).output().unwrap());

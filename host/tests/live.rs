@@ -198,7 +198,9 @@ fn a_device_that_fails() {
     recorded(&t);
     let library = common::faulty_layer();
     let path = t.path().join("street.pcap");
-    for (result, told) in [(-4, "device lost during"), (2, "`flow` did not finish within 500ms")] {
+    for (result, reported) in
+        [(-4, "device lost during"), (2, "`flow` did not finish within 500ms")]
+    {
         let more = ["--backend", "vulkan", "--deadline", "50", "--replay"];
         let mut command = live(&t, &[&more[..], &[path.to_str().unwrap()]].concat());
         command.envs(raywake_faulty_layer::environment(t.path(), &library).unwrap());
@@ -211,7 +213,7 @@ fn a_device_that_fails() {
         o.succeeded();
         assert!(o.stderr.contains("continuing on the scalar backend"), "{}", o.stderr);
         let s = o.summary(&t.path().join("s.json"));
-        assert!(s["device_failure"].as_str().unwrap().contains(told), "{s}");
+        assert!(s["device_failure"].as_str().unwrap().contains(reported), "{s}");
         assert_eq!(s["backend"], "vulkan");
         assert_accounted(&s);
     }
@@ -257,7 +259,7 @@ fn a_signal_stops_it() {
         let mut command = live(&t, &[&BACKEND[..], &listen].concat());
         command.env("NOTIFY_SOCKET", &notified).stdout(Stdio::piped()).stderr(Stdio::piped());
         let child = command.spawn().unwrap();
-        let told = || {
+        let reported = || {
             let mut text = [0; 64];
             let length = watcher.recv(&mut text).unwrap();
             String::from_utf8_lossy(&text[..length]).trim().to_owned()
@@ -285,7 +287,7 @@ fn a_signal_stops_it() {
         let o = Outcome::of(child.wait_with_output().unwrap());
         o.succeeded();
         if sweeps {
-            assert_eq!(told(), "STOPPING=1");
+            assert_eq!(reported(), "STOPPING=1");
             let s = o.summary(&t.path().join("s.json"));
             assert!((s["turn_ms"].as_f64().unwrap() - 75.0 * 1.327).abs() < 0.1, "{s}");
             assert!(s["sender"] == "127.0.0.1" && count(&s, "packets", "foreign") == 0, "{s}");

@@ -182,10 +182,11 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     /// observations as a track needs and got somewhere, or most of its classified returns are of
     /// classes that could move. Outside the flow's window nothing is.
     pub fn is_object(&self, params: &FrontEndParams) -> bool {
-        let told: u32 = self.evidence.classes.iter().sum();
+        let classified: u32 = self.evidence.classes.iter().sum();
         let count = |class: ColumnClass| self.evidence.classes[class as usize];
         let users = ColumnClass::ALL.into_iter().filter(|c| c.could_move()).map(count).sum::<u32>();
-        let is_user = told > 0 && users as f32 >= params.road_user_share_min * told as f32;
+        let is_user =
+            classified > 0 && users as f32 >= params.road_user_share_min * classified as f32;
         let moved = self.evidence.moving >= params.observations_min;
         is_user || moved && self.moved_m() >= params.track_way_min_m
     }

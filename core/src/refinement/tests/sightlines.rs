@@ -175,8 +175,8 @@ fn a_ring_moving_with_the_sensor_is_static() {
         motions(&refinement).iter().flatten().count()
     };
     // If only nearby returns decide, it moves.
-    let [told, near] = [scaled().params.sight_residual, 1.1].map(found);
-    assert!(told == 0 && near > 20, "{told} {near}");
+    let [decided, near] = [scaled().params.sight_residual, 1.1].map(found);
+    assert!(decided == 0 && near > 20, "{decided} {near}");
 }
 
 #[test]
@@ -192,13 +192,13 @@ fn bands_hide_no_ray() {
     };
     // For one sensor, and as if there were so many that each has two bands.
     let [many, few] = [with(1), with(8)];
-    let mut told = 0;
+    let mut decided = 0;
     for n in 0..20_000 {
         let (at, scale) = (place(), [1.0, 0.1, 0.01][n % 3]);
         let at = [0, 1, 2].map(|a| EYES[0][a] + scale * (at[a] - EYES[0][a]));
         let depth = |of: &Sightlines| of.depth(Simd::BASELINE, &scaled(), at, &UNKNOWN, 0.0);
         assert_eq!(depth(&many), depth(&few), "{at:?}");
-        told += usize::from(depth(&many).is_some());
+        decided += usize::from(depth(&many).is_some());
     }
-    assert!(told > 5000, "{told}");
+    assert!(decided > 5000, "{decided}");
 }

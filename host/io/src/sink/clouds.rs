@@ -110,8 +110,8 @@ mod tests {
                 assert_eq!((read.len(), times), (count, timed), "{extension}");
                 for (read, point) in read.iter().zip(&points) {
                     assert_eq!(read.position, point.position, "{extension}");
-                    let told = if timed { point.offset_s } else { 0.0 };
-                    assert!((read.offset_s - told).abs() < 1e-6, "{extension}: {read:?}");
+                    let expected = if timed { point.offset_s } else { 0.0 };
+                    assert!((read.offset_s - expected).abs() < 1e-6, "{extension}: {read:?}");
                 }
             }
         }

@@ -26,8 +26,8 @@ fn poses() {
     t.write("poses.txt", &two);
     let two_of_three = opened(t.path());
     assert_eq!((two_of_three.len(), two_of_three.pose(1).translation.x), (2, 1.0));
-    let told = two_of_three.notes().iter().any(|n| n == "1 sweeps skipped: no pose in poses.txt");
-    assert!(told, "{:?}", two_of_three.notes());
+    let noted = two_of_three.notes().iter().any(|n| n == "1 sweeps skipped: no pose in poses.txt");
+    assert!(noted, "{:?}", two_of_three.notes());
     t.write("poses.txt", two.repeat(2));
     assert!(refused(t.path()).ends_with("poses.txt: 4 poses, expected 3"));
     t.write("poses.txt", two.clone() + "1 0 0 0 0 1 0 0 0 0 nan 0\n");

@@ -68,8 +68,8 @@ impl RangeLaser {
             if let Some((poses, vehicle_from_world)) = pixels {
                 at = vehicle_from_world.transform(pose_of(poses, n).transform(at));
             }
-            let told = Some(value(1)).filter(|v| !v.is_nan());
-            let intensity = told.unwrap_or(0.0).clamp(0.0, 1.0);
+            let given = Some(value(1)).filter(|v| !v.is_nan());
+            let intensity = given.unwrap_or(0.0).clamp(0.0, 1.0);
             let position = at.as_vec3().to_array();
             Some(Point { position, intensity, offset_s: 0.0, sensor: number })
         };
