@@ -50,6 +50,7 @@ mod odometry;
 pub mod order_statistics;
 pub mod outputs;
 pub mod picture;
+mod pose_check;
 pub mod progress;
 mod report;
 mod run;

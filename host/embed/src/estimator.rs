@@ -14,7 +14,7 @@ use raywake_core::weights::WeightsError;
 use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 use raywake_registration::Odometry;
-use raywake_registration::odometry::PoseStatus;
+use raywake_registration::odometry::{EXPECTED_WITHIN_M, PoseStatus};
 
 use crate::memory::{AtRest, Memory, array, bytes_of, state};
 use crate::options::{CreateError, EstimatorOptions};
@@ -232,7 +232,8 @@ impl FlowEstimator {
     fn locate(&mut self, place: &SweepPlace) -> (Pose, Twist, Option<PoseStatus>) {
         let stamp_s = place.stamp_s;
         if let Some(odometry) = &mut self.odometry {
-            place.twist.into_iter().for_each(|twist| odometry.expect(twist));
+            let twist = place.twist.into_iter();
+            twist.for_each(|twist| odometry.expect(twist, EXPECTED_WITHIN_M));
             let found = odometry.locate(stamp_s, self.sweeps[0].points(), &self.setup.rig);
             return (found.world_from_vehicle, found.twist, Some(found.pose_status));
         }

@@ -26,11 +26,12 @@ use thinned::ThinnedSweep;
 const MATCHED_MAX: usize = 3000;
 /// Fewer returns than this, one per voxel, do not make a sweep.
 const RETURNS_MIN: usize = 100;
-/// Widths of the kernel, m, from coarse to fine; the first is only for unknown motions. Not tuned
-/// separately.
+/// Widths of the kernel, m, from coarse to fine; the first is for unknown motions, the last alone
+/// for motions that are well known. Not tuned separately.
 const KERNELS_M: [f64; 3] = [1.0, 0.4, 0.1];
-/// Index of the first kernel used when the motion is expected.
-const EXPECTED_FROM: usize = 1;
+/// The most that a motion is off by over a sweep if nothing is known about it, m. Constant motion
+/// is, at 10 Hz, for changes of speed up to 4 m/s within a sweep.
+pub const EXPECTED_WITHIN_M: f64 = 0.4;
 /// Maximum number of steps with each kernel; 2 to 5 are usual.
 const STEPS: usize = 15;
 /// Minimum share of the matched returns that must lie on the map's planes for a sweep to count as
@@ -112,8 +113,8 @@ pub struct Odometry {
     stamp_s: f64,
     pose: Pose,
     twist: Twist,
-    /// Whether the twist is known from elsewhere.
-    twist_given: bool,
+    /// How far off the twist is over a sweep at most, if it is known from elsewhere, m.
+    twist_within_m: Option<f64>,
     /// Whether other motions fit as well as the one taken.
     unsure: bool,
 }
@@ -135,21 +136,29 @@ impl Odometry {
             stamp_s: 0.0,
             pose: Pose { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), translation: DVec3::ZERO },
             twist: Twist::ZERO,
-            twist_given: false,
+            twist_within_m: None,
             unsure: false,
         }
     }
 
-    /// Sets the motion to expect for the next sweep, along the axes of the vehicle there.
-    pub fn expect(&mut self, twist: Twist) {
-        (self.twist, self.twist_given) = (twist, true);
+    /// Sets the motion to expect of the next sweep, along the axes of the vehicle there, and the
+    /// most that it is off by over a sweep, m; [`EXPECTED_WITHIN_M`] if unknown. The closer it is,
+    /// the less counts what does not follow it, such as traffic.
+    pub fn expect(&mut self, twist: Twist, within_m: f64) {
+        (self.twist, self.twist_within_m) = (twist, Some(within_m));
+    }
+
+    /// Forgets the sweeps so far, but not the motion: the next sweep is the first one.
+    pub fn restart(&mut self) {
+        (self.count, self.unsure) = (0, false);
+        self.map.clear();
     }
 
     /// Locates the next sweep.
     pub fn locate(&mut self, stamp_s: f64, points: &[Point], rig: &Rig) -> Located {
         self.count += 1;
         self.sweeps[self.count as usize % 2].fill(points, rig);
-        let dt_s = duration_s(rig, stamp_s - self.stamp_s);
+        let dt_s = interval_s(rig, stamp_s - self.stamp_s);
         self.stamp_s = stamp_s;
         let pose_status = match self.count {
             1 => {
@@ -182,10 +191,12 @@ impl Odometry {
             return self.start(dt_s);
         }
         let initial = self.pose * self.twist.over(dt_s);
-        let found = self.register(initial, dt_s, &KERNELS_M[EXPECTED_FROM..]);
+        let found = self.register(initial, dt_s, self.kernels_when_expected());
         if is_located(&found) {
             return self.adopt(&found, dt_s);
         }
+        // A motion from elsewhere is farther off than it was said to be.
+        self.twist_within_m = self.twist_within_m.map(|_| KERNELS_M[0]);
         self.start(dt_s)
     }
 
@@ -204,7 +215,7 @@ impl Odometry {
     /// The best-fitting of several motions. If others fit as well, it is unsure, and if it already
     /// was before, the expected one is kept.
     fn best_start(&mut self, dt_s: f64) -> (Registration, Twist) {
-        let speeds_mps = if self.twist_given { &[][..] } else { &SPEEDS_MPS };
+        let speeds_mps = if self.twist_within_m.is_some() { &[][..] } else { &SPEEDS_MPS };
         let ahead = speeds_mps.iter().map(|x| Twist { linear: DVec3::X * *x, ..Twist::ZERO });
         let expected = self.pair(self.twist, dt_s);
         let mut all = heapless::Vec::<_, { SPEEDS_MPS.len() + 1 }>::from([expected]);
@@ -236,7 +247,8 @@ impl Odometry {
     /// given and then as found. Also returns the motion that the one before was deskewed by.
     fn pair(&mut self, motion: Twist, dt_s: f64) -> (Registration, Twist) {
         self.map_of_before(&motion);
-        let found = self.register(self.pose * motion.over(dt_s), dt_s, &KERNELS_M);
+        let within_m = self.twist_within_m.unwrap_or(KERNELS_M[0]);
+        let found = self.register(self.pose * motion.over(dt_s), dt_s, kernels(within_m));
         self.again(&found, dt_s)
     }
 
@@ -245,7 +257,7 @@ impl Odometry {
     fn again(&mut self, found: &Registration, dt_s: f64) -> (Registration, Twist) {
         let motion = (self.pose.inverse() * found.pose).twist(dt_s);
         self.map_of_before(&motion);
-        (self.register(found.pose, dt_s, &KERNELS_M[EXPECTED_FROM..]), motion)
+        (self.register(found.pose, dt_s, self.kernels_when_expected()), motion)
     }
 
     /// Repeats this until the motion moves returns as the previous one did.
@@ -278,6 +290,11 @@ impl Odometry {
         for point in self.sweeps[sweep as usize % 2].points() {
             self.map.add(self.pose.transform(point.at_stamp(motion)), sweep);
         }
+    }
+
+    /// The kernels for a motion that is about known.
+    fn kernels_when_expected(&self) -> &'static [f64] {
+        kernels(self.twist_within_m.unwrap_or(EXPECTED_WITHIN_M))
     }
 
     /// Adopts the pose that was found.
@@ -327,6 +344,12 @@ fn matched<'a>(
     into.iter_mut().zip(found).map(|(slot, found)| *slot = found).count()
 }
 
+/// The kernels from the finest one that is as wide as this.
+fn kernels(within_m: f64) -> &'static [f64] {
+    let from = KERNELS_M.iter().rposition(|kernel_m| *kernel_m >= within_m);
+    &KERNELS_M[from.unwrap_or(0)..]
+}
+
 fn is_located(found: &Registration) -> bool {
     found.overlap >= AGREE_MIN && found.inliers >= CORRESPONDENCES_MIN
 }
@@ -336,8 +359,8 @@ fn constant_twist(before_from_now: &Pose, dt_s: f64) -> Twist {
     before_from_now.inverse().twist(-dt_s)
 }
 
-/// Time between two stamps: rounded to whole revolutions if close, as stamps are often coarser.
-fn duration_s(rig: &Rig, between_s: f64) -> f64 {
+/// Time between two stamps, rounded to whole revolutions if close, as stamps are often coarser.
+pub fn interval_s(rig: &Rig, between_s: f64) -> f64 {
     let period_s = span_s(rig).filter(|period_s| *period_s > 0.0).unwrap_or(between_s);
     let periods = between_s / period_s;
     let whole = libm::round(periods);

@@ -149,6 +149,36 @@ fn traffic_on_a_motorway_leaves_the_speed_undetermined() {
     assert!((last.twist.linear.x - 22.0).abs() < 0.3, "{last:?}");
 }
 
+/// Largest error of speed on a motorway without posts, m/s, behind lorries slower by 2 m/s, if the
+/// speed is expected to be right within this distance per sweep.
+fn speed_error(within_m: f64) -> f64 {
+    let (mut rng, rig) = (Rng::new(3), at_stamp());
+    let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
+    let twist = Twist { linear: 22.0 * DVec3::X, ..Twist::ZERO };
+    let mut error = |n: usize| {
+        let mut points = motorway(&mut rng, n, false);
+        for (rear, y) in [(8.0, -5.0), (15.0, -1.5), (24.0, 2.0), (31.0, -5.0)] {
+            let x = rear - 0.2 * n as f64;
+            let all = (0..120)
+                .map(|at| [x, y + 0.25 * f64::from(at % 10), 0.25 * f64::from(at / 10) - 1.2]);
+            points.extend(all.map(|at| Point {
+                position: at.map(|v| (v + 0.01 * rng.bell()) as f32),
+                ..Point::default()
+            }));
+        }
+        odometry.expect(twist, within_m);
+        let found = odometry.locate(0.1 * n as f64, &points, &rig);
+        (found.twist.linear.x - 22.0).abs()
+    };
+    (0..12).map(&mut error).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_well_known_speed_is_not_taken_from_traffic() {
+    let [rough, fine] = [EXPECTED_WITHIN_M, 0.05].map(speed_error);
+    assert!(rough > 0.2 && fine < 0.02, "{rough} {fine}");
+}
+
 /// A rig whose clouds are as they were at the stamp.
 fn at_stamp() -> Rig {
     Rig {
