@@ -14,14 +14,14 @@ use super::scaled::Scaled;
 use super::scans::Scans;
 use super::search::search;
 use super::slide::slide;
-use super::starts::Votes;
-use crate::record::Flow;
+use super::starts::{TRAFFIC_MAX, Votes};
+use crate::record::{Flow, VALID, flow_displacement};
 
 /// Number of displacements many columns voted for that are tried as starts. Limited to save time:
 /// each start costs a registration.
 const VOTED_STARTS: usize = 3;
-/// In addition to those: rest, the prediction and the search.
-const STARTS_MAX: usize = VOTED_STARTS + 3;
+/// In addition to those: rest, the prediction, the search and traffic.
+const STARTS_MAX: usize = VOTED_STARTS + 3 + TRAFFIC_MAX;
 /// A motion that fits badly is left to the parts of its cluster unless it has this many times the
 /// evidence.
 const BAD_FIT_EVIDENCE: f32 = 2.0;
@@ -135,16 +135,19 @@ impl Trials<'_> {
         }
     }
 
-    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search; then
-    /// slides the cluster along itself from the best of these.
+    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search; then,
+    /// if it moves, how traffic moves: in a row of cars each may fit the next one about as well. It
+    /// then slides the cluster along itself from the best of these.
     fn run(&mut self, predicted: Option<[f32; 2]>, flow: impl Fn(usize) -> Flow) {
         let cluster = self.cluster;
         let params = &cluster.scans.scaled.params;
+        let static_residual = self.residual;
         self.start([0.0; 2]);
         if let Some(by) = predicted {
             self.start(by);
         }
-        let mut votes = Votes::new(cluster.columns.iter().map(|c| flow(*c as usize)));
+        let matches = cluster.columns.iter().map(|c| flow(*c as usize));
+        let mut votes = Votes::new(matches.filter(|f| f & VALID != 0).map(flow_displacement));
         for _ in 0..VOTED_STARTS {
             let wanted = self.residual > params.residual_good;
             let Some(by) = votes.take_mode().filter(|_| wanted) else { break };
@@ -153,6 +156,13 @@ impl Trials<'_> {
         let enough = cluster.samples.len() >= params.search_returns_min as usize;
         if self.residual > params.residual_bad && enough {
             self.start(search(cluster));
+        }
+        if evidence(static_residual, self.residual) > params.evidence_min {
+            for by in cluster.scans.traffic {
+                if self.residual > params.residual_good {
+                    self.start(*by);
+                }
+            }
         }
         if self.residual > params.residual_good
             && let Some(slid) = slide(cluster, &self.motion, self.residual, self.visited)

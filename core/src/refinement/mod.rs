@@ -9,8 +9,9 @@
 //! 3. Each cluster is registered with the second sweep, and with one before the pair if
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
 //!    generalised ICP with a Geman-McClure kernel, both ways, from several starts: rest, what its
-//!    tracklets predict, the displacements most of its columns found by energy minimisation and, if
-//!    none of these fits, a search. Its ends show how far it slid along itself ([`slide`]).
+//!    tracklets predict, the displacements most of its columns found by energy minimisation, if
+//!    none of these fits a search and, if it moves, how traffic does ([`starts`]). Its ends show how
+//!    far it slid along itself ([`slide`]).
 //! 4. A hypothesis test separates dynamic clusters from static ones ([`hypothesis`]): with r0 and r
 //!    the mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman,
 //!    2000), the evidence for motion is (1 - r / r0) sqrt(r0 - r). Up to two sweeps before the pair
@@ -139,7 +140,8 @@ impl Refinement {
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let targets = self.clouds.targets(span_s);
         let detail = self.clouds.second().detail;
-        let scans = Scans { scaled, first, targets: &targets, detail, scores, span_s };
+        let traffic = &starts::traffic((0..side * side).filter_map(predicted));
+        let scans = Scans { scaled, first, targets: &targets, detail, scores, traffic, span_s };
         self.clusters.find(team, scans, &self.history, flow, predicted);
         self.history.push(first, |c| self.clusters.came(c));
     }

@@ -66,6 +66,8 @@ pub struct Scans<'a> {
     pub detail: &'a CloudDetail,
     /// The encoder's scores of the first sweep's columns, empty if nothing is encoded.
     pub scores: &'a [ColumnScores],
+    /// The most frequent displacements that tracklets predict for the pair, voxels.
+    pub traffic: &'a [[f32; 2]],
     /// From the pair's first stamp to the second, s.
     pub span_s: f64,
 }

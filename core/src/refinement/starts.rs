@@ -1,17 +1,24 @@
-//! Starts of a registration: the displacements that the columns of a cluster voted for.
+//! Starts of a registration: the displacements that the columns of a cluster voted for, and those
+//! of traffic.
 
+use super::cues::Prediction;
 use crate::params::{REACH, SIDE};
-use crate::record::{Flow, VALID, flow_displacement};
 
-/// Displacements of matched columns, counted.
+/// Maximum number of displacements of traffic. On motorways (`raywake-lab sim --scenery motorway`)
+/// 8 are no better.
+pub const TRAFFIC_MAX: usize = 4;
+
+/// Displacements by whole cells, counted.
 pub struct Votes([[u16; SIDE]; SIDE]);
 
 impl Votes {
-    pub fn new(flows: impl Iterator<Item = Flow>) -> Votes {
+    /// Counts displacements; those beyond reach are left out.
+    pub fn new(displacements: impl Iterator<Item = [i32; 2]>) -> Votes {
         let mut votes = [[0u16; SIDE]; SIDE];
-        for flow in flows.filter(|f| f & VALID != 0) {
-            let [u, v] = flow_displacement(flow).map(|d| (d + REACH) as usize);
-            votes[u][v] = votes[u][v].saturating_add(1);
+        for [u, v] in displacements.map(|by| by.map(|d| d.saturating_add(REACH) as usize)) {
+            if let Some(count) = votes.get_mut(u).and_then(|line| line.get_mut(v)) {
+                *count = count.saturating_add(1);
+            }
         }
         Votes(votes)
     }
@@ -38,4 +45,14 @@ impl Votes {
         }
         Some(at.map(|v| v / sum))
     }
+}
+
+/// The most frequent displacements other than rest that tracklets predict: what drives in a lane
+/// moves alike.
+pub fn traffic(
+    predictions: impl Iterator<Item = Prediction>,
+) -> heapless::Vec<[f32; 2], TRAFFIC_MAX> {
+    let whole = predictions.map(|p| p.by.map(|d| libm::roundf(d) as i32));
+    let mut votes = Votes::new(whole.filter(|by| *by != [0; 2]));
+    core::iter::from_fn(|| votes.take_mode()).take(TRAFFIC_MAX).collect()
 }

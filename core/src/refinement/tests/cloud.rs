@@ -138,7 +138,15 @@ fn segments_are_what_a_flood_fill_reaches() {
         let part = |c: usize| c != excluded && cloud.levels(c) != 0;
         let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
         let (scaled, detail) = (&scaled(), cloud.detail);
-        let scans = Scans { scaled, first: cloud, targets: &[], detail, scores: &[], span_s: 0.1 };
+        let scans = Scans {
+            scaled,
+            first: cloud,
+            targets: &[],
+            detail,
+            scores: &[],
+            traffic: &[],
+            span_s: 0.1,
+        };
         segments.find(&scans, part, |c| flows[c]);
         let touch = |a: usize, b: usize| {
             let apart =

@@ -7,6 +7,7 @@ mod history;
 mod motion;
 mod odd;
 mod sightlines;
+mod starts;
 
 use super::cloud::{Cloud, DetailedCloud};
 use super::cloud_detail::CloudDetail;
