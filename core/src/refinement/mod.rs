@@ -10,8 +10,8 @@
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
 //!    generalised ICP with a Geman-McClure kernel, both ways, from several starts: rest, what its
 //!    tracklets predict, the displacements most of its columns found by energy minimisation, if
-//!    none of these fits a search and, if it moves, how traffic does ([`starts`]). Its ends show how
-//!    far it slid along itself ([`slide`]).
+//!    none of these fits a search and, if it moves, how traffic moves ([`starts`]). Its ends show
+//!    how far it slid along itself ([`slide`]).
 //! 4. A hypothesis test separates dynamic clusters from static ones ([`hypothesis`]): with r0 and r
 //!    the mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman,
 //!    2000), the evidence for motion is (1 - r / r0) sqrt(r0 - r). Up to two sweeps before the pair
