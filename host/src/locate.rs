@@ -16,7 +16,7 @@ use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::memory;
 use crate::order_statistics::Spread;
-use crate::pose_check::{LEVER_ARM_M, PoseCheck, Task};
+use crate::pose_check::{JUDGED, LEVER_ARM_M, PoseCheck, Task};
 
 /// What became of the recording's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -100,9 +100,10 @@ pub struct LocatedSweeps {
     /// Sweeps whose motion was determined.
     pub registered: u64,
     /// Sweeps that show too little, such as a wall, a tunnel, or a motorway with traffic as fast as
-    /// the vehicle: part of their motion is taken from the sweep before, or guessed.
+    /// the vehicle: part of their motion is taken from the recording's poses or, without those,
+    /// from the sweep before, or guessed.
     pub degenerate: u64,
-    /// Sweeps that match nothing known: their motion is taken from the sweep before.
+    /// Sweeps that match nothing known: their motion is taken from the same.
     pub lost: u64,
     /// Time per sweep, ms; null for a single sweep.
     pub ms: Option<Spread>,
@@ -207,6 +208,9 @@ impl LocatedSweeps {
                 format!("too unevenly: {} {end}\n{}", self.replaced, self.line())
             }
             PoseUse::Keep if !self.disagrees => "the poses are used\n".into(),
+            PoseUse::Keep if self.registered + self.degenerate + self.lost < JUDGED as u64 => {
+                "but these are too few to judge: the poses are used\n".into()
+            }
             PoseUse::Keep if self.one_sided => {
                 "all in one direction: the poses are used; if wrong, use --poses register\n".into()
             }
@@ -224,9 +228,11 @@ impl LocatedSweeps {
     fn line(&self) -> String {
         let LocatedSweeps { registered, degenerate, lost, ms, .. } = self;
         let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
-        let doubt = match degenerate {
-            0 => "",
-            _ => "degenerate sweeps do not show how far the vehicle moved: poses may be far off\n",
+        let doubt = match self.poses {
+            PoseUse::Find if *degenerate > 0 => {
+                "degenerate sweeps do not show how far the vehicle moved: poses may be far off\n"
+            }
+            _ => "",
         };
         format!(
             "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; \

@@ -10,7 +10,7 @@ use raywake_io::source::SweepData;
 use raywake_registration::odometry::{EXPECTED_WITHIN_M, interval_s};
 
 /// Number of steps from sweep to sweep by which poses are judged.
-const JUDGED: usize = 10;
+pub const JUDGED: usize = 10;
 /// Distance from the vehicle at which steps are compared, m, so that rotation counts too.
 pub const LEVER_ARM_M: f64 = 20.0;
 /// Poses with no more jitter than this are good, m: three times the error that `pose_noise_m`

@@ -82,6 +82,8 @@ fn given_poses() {
         "{}",
         poor.stdout
     );
+    let few = run("poor.txt", &noisy, &["-n", "6"]);
+    assert!(few.stdout.contains("too few to judge: the poses are used"), "{}", few.stdout);
     let kept = run("poor.txt", &noisy, &["--trust-poses"]);
     assert!(!kept.stdout.contains("registration"), "{}", kept.stdout);
     assert_ne!(digest(&poor), digest(&kept));
