@@ -152,7 +152,7 @@ pub struct Recording {
     /// Frame the poses refer to
     #[arg(long, value_name = "FRAME")]
     pub poses_frame: Option<PosesFrame>,
-    /// Use the poses even where they are much less even than registration
+    /// Use the poses even where they jitter much more than registration
     #[arg(long)]
     pub trust_poses: bool,
 }

@@ -204,8 +204,8 @@ impl LocatedSweeps {
         let verdict = match self.poses {
             PoseUse::Find => return self.line(),
             PoseUse::Replace => {
-                let end = "of the steps are from registration (--trust-poses keeps the poses)";
-                format!("too unevenly: {} {end}\n{}", self.replaced, self.line())
+                let end = "steps are from registration (--trust-poses keeps the poses)";
+                format!("as the poses jitter: {} {end}\n{}", self.replaced, self.line())
             }
             PoseUse::Keep if !self.disagrees => "the poses are used\n".into(),
             PoseUse::Keep if self.registered + self.degenerate + self.lost < JUDGED as u64 => {
@@ -214,7 +214,7 @@ impl LocatedSweeps {
             PoseUse::Keep if self.one_sided => {
                 "all in one direction: the poses are used; if wrong, use --poses register\n".into()
             }
-            PoseUse::Keep => "but registration is less even: the poses are used\n".into(),
+            PoseUse::Keep => "but registration is no smoother: the poses are used\n".into(),
         };
         self.disagreement_m.map_or(String::new(), |metres| {
             format!(

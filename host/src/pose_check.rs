@@ -1,5 +1,5 @@
-//! Whether the poses of a recording are good enough to distinguish what moves, judged by how evenly
-//! they move compared with registration.
+//! Whether the poses of a recording are good enough to distinguish what moves, judged by how much
+//! their steps jitter compared with those of registration.
 
 use glam::DVec3;
 use heapless::HistoryBuf;

@@ -76,7 +76,7 @@ fn given_poses() {
     assert!(good.stdout.contains("the poses are used"), "{}", good.stdout);
     let noisy = |n: usize| if n.is_multiple_of(2) { 0.015 } else { -0.015 };
     let poor = run("poor.txt", &noisy, &[]);
-    let words = "too unevenly: 4 of the steps are from registration";
+    let words = "as the poses jitter: 4 steps are from registration";
     assert!(
         poor.stdout.contains(words) && poor.stdout.contains("13 sweeps located"),
         "{}",
