@@ -8,7 +8,7 @@ use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::Rig;
 use raywake_io::source::{Source, SweepData};
 use raywake_registration::Odometry;
-use raywake_registration::odometry::{Located, PoseStatus};
+use raywake_registration::odometry::{LEVER_ARM_M, Located, PoseStatus};
 use serde::Serialize;
 
 use crate::console::bytes;
@@ -16,7 +16,7 @@ use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::memory;
 use crate::order_statistics::Spread;
-use crate::pose_check::{JUDGED, LEVER_ARM_M, PoseCheck, Task};
+use crate::pose_check::{JITTER_MAX_M, JUDGED, PoseCheck, Task};
 
 /// What became of the recording's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -93,9 +93,7 @@ pub struct LocatedSweeps {
     pub poses: PoseUse,
     /// Steps of the recording's poses that were replaced.
     pub replaced: u64,
-    /// Whether steps by poses and by registration differ by much.
-    pub disagrees: bool,
-    /// Whether they differ mostly in one direction.
+    /// Whether steps by poses and by registration differ mostly in one direction.
     pub one_sided: bool,
     /// Sweeps whose motion was determined.
     pub registered: u64,
@@ -168,7 +166,7 @@ impl Locator {
             }
             Task::Register(given, expected, within_m) => {
                 let found = registrar.step(rig, sweep, (expected, within_m))?;
-                check.is_replaced(given, found.1).then_some(found)
+                check.judge(given, found.1).then_some(found)
             }
         };
         check.settle(sweep, replaced);
@@ -188,7 +186,6 @@ impl Locator {
                 Some(_) => PoseUse::Replace,
             },
             replaced,
-            disagrees: check.is_some_and(PoseCheck::disagrees),
             one_sided: check.is_some_and(PoseCheck::is_one_sided),
             registered: count(PoseStatus::Registered),
             degenerate: count(PoseStatus::Degenerate),
@@ -207,7 +204,9 @@ impl LocatedSweeps {
                 let end = "steps are from registration (--trust-poses keeps the poses)";
                 format!("as the poses jitter: {} {end}\n{}", self.replaced, self.line())
             }
-            PoseUse::Keep if !self.disagrees => "the poses are used\n".into(),
+            PoseUse::Keep if self.disagreement_m <= Some(JITTER_MAX_M) => {
+                "the poses are used\n".into()
+            }
             PoseUse::Keep if self.registered + self.degenerate + self.lost < JUDGED as u64 => {
                 "but these are too few to judge: the poses are used\n".into()
             }

@@ -7,16 +7,14 @@ use raywake_core::continuity::ContinuityLimits;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::Rig;
 use raywake_io::source::SweepData;
-use raywake_registration::odometry::{EXPECTED_WITHIN_M, interval_s};
+use raywake_registration::odometry::{EXPECTED_WITHIN_M, LEVER_ARM_M, interval_s};
 
 /// Number of steps from sweep to sweep by which poses are judged.
 pub const JUDGED: usize = 10;
-/// Distance from the vehicle at which steps are compared, m, so that rotation counts too.
-pub const LEVER_ARM_M: f64 = 20.0;
 /// Poses with no more jitter than this are good, m: three times the error that `pose_noise_m`
 /// assumes. Exact poses have at most 0.1 cm, scan-matched ones 0.8 to 1.0 cm (KITTI, KITTI-360),
 /// those of a GNSS-aided inertial unit 2.7 to 18 cm (KITTI, simulated).
-const JITTER_MAX_M: f64 = 0.015;
+pub const JITTER_MAX_M: f64 = 0.015;
 /// Others are replaced if registration has less than this share of their jitter. Where it is right
 /// it has 0.02 to 0.47 of it, where it follows traffic between guard rails mostly more than all of
 /// it (simulated drives with and without such errors, KITTI).
@@ -25,7 +23,7 @@ const SMOOTHER: f64 = 0.5;
 /// unless the vehicle brakes (the same drives with such errors).
 const LINE_OFF: f64 = 0.5;
 /// Poses that were found good are judged again after this many sweeps, as a vehicle that stands
-/// shows no errors of time. Registration takes about half as long as the flow of a sweep.
+/// shows no errors of time. Less often than always, as registration takes time.
 const UNCHECKED: u32 = 90;
 /// Differences from registration whose mean is this share of their root mean square, or more, point
 /// in one direction.
@@ -163,8 +161,8 @@ impl PoseCheck {
         Task::Register(GivenStep { velocity, interval_s }, expected, within_m)
     }
 
-    /// Compares a step with registration, and says whether registration is to be used.
-    pub fn is_replaced(&mut self, given: GivenStep, registered: Twist) -> bool {
+    /// Compares a step with registration. Returns whether registration replaces it.
+    pub fn judge(&mut self, given: GivenStep, registered: Twist) -> bool {
         let GivenStep { velocity, interval_s } = given;
         self.registered.0.write(registered);
         self.differences.add(&velocity, &registered, interval_s);
@@ -202,11 +200,6 @@ impl PoseCheck {
     /// `LEVER_ARM_M` away, m; `None` without any.
     pub fn disagreement_m(&self) -> Option<f64> {
         self.differences.rms_m()
-    }
-
-    /// Whether these differences are large.
-    pub fn disagrees(&self) -> bool {
-        self.disagreement_m() > Some(JITTER_MAX_M)
     }
 
     /// Whether these differences point in one direction, as from a false scale, a frame other than
@@ -264,7 +257,7 @@ mod tests {
                 let replaced = match run.check.next(&rig(), &sweep) {
                     Task::Register(given, ..) => {
                         run.registered.push(n);
-                        run.check.is_replaced(given, twist).then_some((step, twist))
+                        run.check.judge(given, twist).then_some((step, twist))
                     }
                     Task::Start | Task::Use => None,
                 };

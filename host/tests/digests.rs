@@ -121,8 +121,8 @@ fn digest(t: &Temp, program: &Path, mode: RunMode, more: &[&str]) -> String {
     let on_device = matches!(mode, RunMode::Vulkan(..));
     assert_eq!(s["backend"], if on_device { "vulkan" } else { "scalar" });
     if let (RunMode::Vulkan(width, _), Some(device)) = (mode, s["device"].as_str()) {
-        let reported = !device.starts_with("llvmpipe") || device.contains(&format!("{width} bits"));
-        assert!(reported, "{device} for {width} bits");
+        let right = !device.starts_with("llvmpipe") || device.contains(&format!("{width} bits"));
+        assert!(right, "{device} for {width} bits");
     }
     assert!(number("device_bytes") <= DEVICE_BYTES, "{s}");
     assert!(number("vulkan_allocations") <= 3, "{s}");

@@ -259,7 +259,7 @@ fn a_signal_stops_it() {
         let mut command = live(&t, &[&BACKEND[..], &listen].concat());
         command.env("NOTIFY_SOCKET", &notified).stdout(Stdio::piped()).stderr(Stdio::piped());
         let child = command.spawn().unwrap();
-        let reported = || {
+        let notified_state = || {
             let mut text = [0; 64];
             let length = watcher.recv(&mut text).unwrap();
             String::from_utf8_lossy(&text[..length]).trim().to_owned()
@@ -287,7 +287,7 @@ fn a_signal_stops_it() {
         let o = Outcome::of(child.wait_with_output().unwrap());
         o.succeeded();
         if sweeps {
-            assert_eq!(reported(), "STOPPING=1");
+            assert_eq!(notified_state(), "STOPPING=1");
             let s = o.summary(&t.path().join("s.json"));
             assert!((s["turn_ms"].as_f64().unwrap() - 75.0 * 1.327).abs() < 0.1, "{s}");
             assert!(s["sender"] == "127.0.0.1" && count(&s, "packets", "foreign") == 0, "{s}");

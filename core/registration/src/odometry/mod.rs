@@ -29,8 +29,8 @@ const RETURNS_MIN: usize = 100;
 /// Widths of the kernel, m, from coarse to fine; the first is for unknown motions, the last alone
 /// for motions that are well known. Not tuned separately.
 const KERNELS_M: [f64; 3] = [1.0, 0.4, 0.1];
-/// The most that a motion is off by over a sweep if nothing is known about it, m. Constant motion
-/// is, at 10 Hz, for changes of speed up to 4 m/s within a sweep.
+/// Assumed error over a sweep of a motion of which nothing else is known, such as constant motion,
+/// m: at 10 Hz a change of speed by 4 m/s.
 pub const EXPECTED_WITHIN_M: f64 = 0.4;
 /// Maximum number of steps with each kernel; 2 to 5 are usual.
 const STEPS: usize = 15;
@@ -59,7 +59,7 @@ const SETTLED_M: f64 = 0.01;
 /// Maximum number of rounds to get there: what is left of 30 m/s then is below 1 cm.
 const ROUNDS_MAX: usize = 5;
 /// Assumed distance of returns moved by a rotation, m.
-const LEVER_ARM_M: f64 = 20.0;
+pub const LEVER_ARM_M: f64 = 20.0;
 /// Intervals between stamps this close to whole revolutions of the sensor come from a coarser
 /// clock, revolutions.
 const WHOLE: f64 = 0.2;
@@ -191,7 +191,7 @@ impl Odometry {
             return self.start(dt_s);
         }
         let initial = self.pose * self.twist.over(dt_s);
-        let found = self.register(initial, dt_s, self.kernels_when_expected());
+        let found = self.register(initial, dt_s, self.kernels(EXPECTED_WITHIN_M));
         if is_located(&found) {
             return self.adopt(&found, dt_s);
         }
@@ -247,8 +247,8 @@ impl Odometry {
     /// given and then as found. Also returns the motion that the one before was deskewed by.
     fn pair(&mut self, motion: Twist, dt_s: f64) -> (Registration, Twist) {
         self.map_of_before(&motion);
-        let within_m = self.twist_within_m.unwrap_or(KERNELS_M[0]);
-        let found = self.register(self.pose * motion.over(dt_s), dt_s, kernels(within_m));
+        let initial = self.pose * motion.over(dt_s);
+        let found = self.register(initial, dt_s, self.kernels(KERNELS_M[0]));
         self.again(&found, dt_s)
     }
 
@@ -257,7 +257,7 @@ impl Odometry {
     fn again(&mut self, found: &Registration, dt_s: f64) -> (Registration, Twist) {
         let motion = (self.pose.inverse() * found.pose).twist(dt_s);
         self.map_of_before(&motion);
-        (self.register(found.pose, dt_s, self.kernels_when_expected()), motion)
+        (self.register(found.pose, dt_s, self.kernels(EXPECTED_WITHIN_M)), motion)
     }
 
     /// Repeats this until the motion moves returns as the previous one did.
@@ -292,9 +292,12 @@ impl Odometry {
         }
     }
 
-    /// The kernels for a motion that is about known.
-    fn kernels_when_expected(&self) -> &'static [f64] {
-        kernels(self.twist_within_m.unwrap_or(EXPECTED_WITHIN_M))
+    /// The kernels from the finest one that is as wide as the error of the motion, which is
+    /// `usual_m` if it is not known from elsewhere.
+    fn kernels(&self, usual_m: f64) -> &'static [f64] {
+        let within_m = self.twist_within_m.unwrap_or(usual_m);
+        let from = KERNELS_M.iter().rposition(|kernel_m| *kernel_m >= within_m);
+        &KERNELS_M[from.unwrap_or(0)..]
     }
 
     /// Adopts the pose that was found.
@@ -342,12 +345,6 @@ fn matched<'a>(
         Some(found)
     });
     into.iter_mut().zip(found).map(|(slot, found)| *slot = found).count()
-}
-
-/// The kernels from the finest one that is as wide as this.
-fn kernels(within_m: f64) -> &'static [f64] {
-    let from = KERNELS_M.iter().rposition(|kernel_m| *kernel_m >= within_m);
-    &KERNELS_M[from.unwrap_or(0)..]
 }
 
 fn is_located(found: &Registration) -> bool {
