@@ -1,5 +1,6 @@
 //! The user's terminal: what a command prints, and the signals that interrupt it.
 
+use std::fmt;
 use std::io::{self, Write};
 #[cfg(unix)]
 use std::sync::Arc;
@@ -81,13 +82,13 @@ pub fn await_viewer(quiet: bool, sink: Option<&BagSink>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Formats bytes in a suitable unit.
-pub fn bytes(bytes: u64) -> String {
-    match bytes {
-        0..10_000 => format!("{bytes} B"),
-        10_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),
-        _ => format!("{:.1} MB", bytes as f64 * 1e-6),
-    }
+/// Formats bytes in a suitable unit, without allocating.
+pub fn bytes(bytes: u64) -> impl fmt::Display {
+    fmt::from_fn(move |f| match bytes {
+        0..10_000 => write!(f, "{bytes} B"),
+        10_000..1_000_000 => write!(f, "{:.1} kB", bytes as f64 * 1e-3),
+        _ => write!(f, "{:.1} MB", bytes as f64 * 1e-6),
+    })
 }
 
 /// Formats output for programs as pretty-printed JSON.

@@ -45,7 +45,7 @@ pub mod latency;
 mod live;
 pub mod locate;
 pub mod map;
-mod memory;
+pub mod memory;
 mod odometry;
 pub mod order_statistics;
 pub mod outputs;

@@ -9,7 +9,7 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 use raywake::args::Args;
 use raywake::console::warn;
-use raywake_alloc_guard::Guard;
+use raywake_alloc_guard::{Guard, OnRefusal};
 
 /// Exits with clap's message or, if a recording was given without a command, with a suggested
 /// command.
@@ -41,7 +41,7 @@ fn report_damaged_files() {
 }
 
 #[global_allocator]
-static ALLOCATOR: Guard<System> = Guard(System);
+static ALLOCATOR: Guard<OnRefusal<System>> = Guard(OnRefusal(System, raywake::memory::end));
 
 fn main() -> ExitCode {
     #[cfg(any(feature = "arrow", feature = "mcap"))]

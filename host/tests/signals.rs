@@ -36,6 +36,30 @@ fn too_little_memory_is_reported_before_the_first_sweep() {
     }
 }
 
+/// Nor is the process aborted where memory runs out later: in reading, in a thread, in writing.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_lack_of_memory_aborts() {
+    let t = Temp::new();
+    t.drive(2);
+    let program = env!("CARGO_BIN_EXE_raywake");
+    let [data, out] = ["drive", "out"].map(|name| t.path().join(name).display().to_string());
+    // From a little more than the program takes to start to more than a run needs.
+    let codes: Vec<_> = (40..260)
+        .step_by(5)
+        .chain([4096])
+        .map(|mib| {
+            let kib = mib << 10;
+            let command = format!("run {data} --backend scalar --out {out}");
+            let line = format!("ulimit -v {kib}; exec {program} {command}");
+            let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
+            assert!(matches!(o.code, Some(0 | 6)), "{kib}: {:?}, {}", o.code, o.stderr);
+            o.code.unwrap()
+        })
+        .collect();
+    assert!(codes.starts_with(&[6]) && codes.ends_with(&[0]), "{codes:?}");
+}
+
 #[test]
 fn a_second_interrupt_ends_at_once() {
     let t = Temp::new();

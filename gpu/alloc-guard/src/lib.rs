@@ -36,8 +36,10 @@
 #![deny(missing_docs)]
 
 mod boxed;
+mod refusal;
 
 pub use boxed::{Constant, boxed};
+pub use refusal::{OnRefusal, is_granted};
 
 use std::alloc::{GlobalAlloc, Layout};
 use std::backtrace::{Backtrace, BacktraceStatus};
