@@ -14,8 +14,8 @@ use serde::Serialize;
 use crate::console::bytes;
 use crate::error::RunError;
 use crate::laps::milliseconds;
+use crate::latency::{Latencies, LatencyFigures};
 use crate::memory;
-use crate::order_statistics::Spread;
 use crate::pose_check::{JITTER_MAX_M, JUDGED, PoseCheck, Task};
 
 /// What became of the recording's poses.
@@ -43,7 +43,7 @@ struct Registrar {
     /// Pose of the sweep before.
     last: Pose,
     counts: [u64; 4],
-    times_ms: Vec<f64>,
+    times: Latencies,
 }
 
 impl Registrar {
@@ -59,7 +59,9 @@ impl Registrar {
             Ok::<_, RunError>(odometry.locate(sweep.stamp_s, &sweep.points, rig))
         })?;
         self.counts[found.pose_status as usize] += 1;
-        self.times_ms.push(milliseconds(clock));
+        if found.pose_status != PoseStatus::Start {
+            self.times.add(milliseconds(clock));
+        }
         Ok(found)
     }
 
@@ -104,14 +106,14 @@ pub struct LocatedSweeps {
     /// Sweeps that match nothing known: their motion is taken from the same.
     pub lost: u64,
     /// Time per sweep, ms; null for a single sweep.
-    pub ms: Option<Spread>,
+    pub ms: Option<LatencyFigures>,
 }
 
 /// Allocates the registration of sweeps, starting at rest.
 ///
 /// # Errors
 /// [`RunError::NoMemory`].
-pub fn registration() -> Result<Sealed<Box<Odometry>>, RunError> {
+fn registration() -> Result<Sealed<Box<Odometry>>, RunError> {
     memory::probe_memory(Locator::BYTES)?;
     let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     Ok(Sealed::new("registration", odometry))
@@ -128,9 +130,17 @@ impl Locator {
     pub fn of<S: Source + ?Sized>(source: &S) -> Result<Option<Locator>, RunError> {
         match source.is_located() {
             true if source.overview().trusted => Ok(None),
-            true => Locator::new(Some(PoseCheck::new())).map(Some),
+            true => Locator::checking().map(Some),
             false => Locator::finding().map(Some),
         }
+    }
+
+    /// A locator for sweeps with poses.
+    ///
+    /// # Errors
+    /// [`RunError::NoMemory`].
+    pub fn checking() -> Result<Locator, RunError> {
+        Locator::new(Some(PoseCheck::new()))
     }
 
     /// A locator for sweeps without poses.
@@ -143,7 +153,8 @@ impl Locator {
 
     fn new(check: Option<PoseCheck>) -> Result<Locator, RunError> {
         let (odometry, last) = (registration()?, Pose::IDENTITY);
-        let registrar = Registrar { odometry, last, counts: [0; 4], times_ms: Vec::new() };
+        let (counts, times) = ([0; 4], Latencies::default());
+        let registrar = Registrar { odometry, last, counts, times };
         Ok(Locator { registrar, check })
     }
 
@@ -190,7 +201,7 @@ impl Locator {
             registered: count(PoseStatus::Registered),
             degenerate: count(PoseStatus::Degenerate),
             lost: count(PoseStatus::Lost),
-            ms: self.registrar.times_ms.get(1..).and_then(Spread::of),
+            ms: self.registrar.times.figures(),
         }
     }
 }
@@ -226,7 +237,7 @@ impl LocatedSweeps {
 
     fn line(&self) -> String {
         let LocatedSweeps { registered, degenerate, lost, ms, .. } = self;
-        let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
+        let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line()));
         let doubt = match self.poses {
             PoseUse::Find if *degenerate > 0 => {
                 "degenerate sweeps do not show how far the vehicle moved: poses may be far off\n"

@@ -1,5 +1,6 @@
 //! The program from the user's side: exit codes, messages, files.
 
+#[allow(dead_code)]
 mod common;
 
 use std::fs;

@@ -7,7 +7,7 @@ mod common;
 
 use std::fs::{self, File};
 use std::io::BufWriter;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::UdpSocket;
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -156,23 +156,14 @@ fn overload() {
     assert!(count(&s, "sweeps", "done") > 0 && s["deadline_ms"] == 5.0);
 }
 
-/// Poses received as datagrams, before the sweeps of their times.
-#[test]
-fn arriving_poses() {
+/// The summary of a replay with poses received as datagrams, before the sweeps of their times: at
+/// 2 m/s, and this far to the left and to the right by turns, m.
+fn with_poses(jitter_m: f64, more: &[&str]) -> Value {
     let t = Temp::new();
     recorded(&t);
-    let place = |s: f64| [2.0 * s, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
-    let send = move |to: SocketAddr| {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        for n in 0..300_u64 {
-            let numbers = place(n as f64 * 0.01);
-            let stamp = 1_700_000_000_000_000_000 + n * 10_000_000;
-            let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
-            let bytes = b"RWP1\0\0\0\0".iter().copied().chain(stamp.to_le_bytes()).chain(numbers);
-            socket.send_to(&bytes.collect::<Vec<u8>>(), to).unwrap();
-            thread::sleep(Duration::from_millis(1));
-        }
-        socket.send_to(b"no pose", to).unwrap();
+    let place = move |n: u64| {
+        let aside_m = if (n / 10).is_multiple_of(2) { jitter_m } else { -jitter_m };
+        [0.02 * n as f64, aside_m, 0.0, 0.0, 0.0, 0.0, 1.0]
     };
     // A port that was free a moment ago.
     let (free, address) = socket();
@@ -180,15 +171,32 @@ fn arriving_poses() {
     drop(free);
     let sending = thread::spawn(move || {
         thread::sleep(Duration::from_millis(100));
-        send(to);
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for n in 0..300_u64 {
+            let stamp = 1_700_000_000_000_000_000 + n * 10_000_000;
+            let numbers = place(n).into_iter().flat_map(f64::to_le_bytes);
+            let bytes = b"RWP1\0\0\0\0".iter().copied().chain(stamp.to_le_bytes()).chain(numbers);
+            socket.send_to(&bytes.collect::<Vec<u8>>(), to).unwrap();
+            thread::sleep(Duration::from_millis(1));
+        }
+        socket.send_to(b"no pose", to).unwrap();
     });
-    let (_, s) = replayed(&t, &[&BACKEND[..], &["--poses-from", &address]].concat());
+    let (_, s) = replayed(&t, &[&BACKEND[..], &["--poses-from", &address], more].concat());
     sending.join().unwrap();
     assert_accounted(&s);
-    assert_eq!(s["located"]["registered"], 0);
-    let done = count(&s, "sweeps", "done");
-    assert_eq!(count(&s, "located", "by_poses"), done);
     assert_eq!((count(&s, "poses", "poses"), count(&s, "poses", "foreign")), (300, 1));
+    assert_eq!(count(&s, "located", "with_pose"), count(&s, "sweeps", "done"));
+    s
+}
+
+#[test]
+fn received_poses_are_checked_against_registration() {
+    let poses = |jitter_m, more: &'static [&str]| {
+        thread::spawn(move || with_poses(jitter_m, more)["located"]["registration"]["poses"].take())
+    };
+    let runs = [poses(0.0, &[]), poses(0.1, &[]), poses(0.1, &["--trust-poses"])];
+    let found = runs.map(|run| run.join().unwrap());
+    assert_eq!(found, ["keep".into(), "replace".into(), Value::Null]);
 }
 
 /// A device that is lost, or does not answer, in the fourth sweep.
@@ -270,7 +278,7 @@ fn a_signal_stops_it() {
             let mut n = 0;
             watcher.set_nonblocking(true).unwrap();
             while watcher.recv(&mut [0; 64]).is_err() {
-                let _ = sensor.send_to(&vlp16(n), &address);
+                let _ = sensor.send_to(&common::vlp16(n), &address);
                 n += 1;
                 thread::sleep(Duration::from_micros(300));
                 assert!(since.elapsed() < Duration::from_secs(60));
@@ -316,7 +324,7 @@ fn a_stall() {
     let (mut n, mut swept) = (0, Vec::new());
     let mut sends = |until: &dyn Fn(usize) -> bool| {
         while !until(swept.len()) {
-            let _ = sensor.send_to(&vlp16(n), &address);
+            let _ = sensor.send_to(&common::vlp16(n), &address);
             n += 1;
             thread::sleep(Duration::from_micros(1327));
             let mut datagram = [0; 2000];
@@ -346,21 +354,6 @@ fn a_stall() {
     assert!(recovered > before, "{swept:?}");
     let last = &swept[recovered..];
     assert!(last.iter().all(|sweep| sweep.0 > 0.0 && sweep.1 == last[0].1), "{swept:?}");
-}
-
-/// A packet of a VLP-16 in the middle of a room, 16 m by 24 m; `n` counts packets, 75 per
-/// revolution.
-fn vlp16(n: u32) -> Vec<u8> {
-    let block = |block: u32| {
-        let azimuth = ((n * 12 + block) * 40 % 36_000) as u16;
-        let (sin, cos) = (f64::from(azimuth) * 0.01).to_radians().sin_cos();
-        let distance = (12.0 / cos.abs()).min(8.0 / sin.abs());
-        let [low, high] = ((distance / 0.002) as u16).to_le_bytes();
-        let seen = [low, high, 51].repeat(32);
-        [&[0xff, 0xee][..], &azimuth.to_le_bytes(), &seen].concat()
-    };
-    let blocks: Vec<u8> = (0..12).flat_map(block).collect();
-    [&blocks[..], &(n * 1327).to_le_bytes(), &[0x37, 0x22]].concat()
 }
 
 #[test]

@@ -43,6 +43,9 @@ pub struct LiveArgs {
     #[arg(long, value_name = "ADDRESS:PORT|register", default_value = "register")]
     #[arg(value_parser = poses_from)]
     pub poses_from: PosesFrom,
+    /// Use received poses even where they jitter much more than registration
+    #[arg(long)]
+    pub trust_poses: bool,
     /// Latency from a sweep's last packet to its flow beyond which it counts as late, ms [default:
     /// one revolution of the sensor]
     #[arg(long, value_name = "MS", value_parser = milliseconds)]

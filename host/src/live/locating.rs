@@ -1,63 +1,64 @@
-//! Locating the vehicle: by registration, or by received poses.
+//! Locating the vehicle: by received poses, by registration, or by poses where registration does
+//! not show them to be poor.
 
-use raywake_alloc_guard::Sealed;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
 use raywake_io::source::capture::assembly::LiveSweep;
-use raywake_registration::Odometry;
-use raywake_registration::odometry::PoseStatus;
 use serde::Serialize;
 
 use super::poses::PoseReceiver;
 use crate::error::RunError;
-use crate::locate::registration;
+use crate::locate::{LocatedSweeps, Locator};
 
 /// How sweeps were located.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LocatedCounts {
-    /// By received poses.
-    pub by_poses: u64,
-    /// Dropped for lack of a pose.
+    /// Sweeps for which poses had been received.
+    pub with_pose: u64,
+    /// Sweeps dropped because none had.
     pub without_pose: u64,
-    /// By registration, including the first one.
-    pub registered: u64,
-    /// Sweeps that show too little: part of their motion is taken from the sweep before.
-    pub degenerate: u64,
-    /// Sweeps that match nothing known: their motion is taken from the sweep before.
-    pub lost: u64,
+    /// What registration did, unless received poses are trusted.
+    pub registration: Option<LocatedSweeps>,
 }
 
 /// Locates one sweep after another.
 pub struct LiveLocator<'a> {
-    by: By<'a>,
-    counts: LocatedCounts,
-}
-
-enum By<'a> {
-    Registration(Sealed<Box<Odometry>>),
-    Poses(&'a PoseReceiver),
+    poses: Option<&'a PoseReceiver>,
+    /// Finds poses, or checks those received.
+    locator: Option<Locator>,
+    with_pose: u64,
+    without_pose: u64,
 }
 
 impl<'a> LiveLocator<'a> {
-    /// Locates by poses, or by registration if there is no receiver.
+    /// Locates by poses, or by registration if there is no receiver. `trusted` poses are not
+    /// checked.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
-    pub fn new(poses: Option<&'a PoseReceiver>) -> Result<LiveLocator<'a>, RunError> {
-        let by = match poses {
-            Some(poses) => By::Poses(poses),
-            None => By::Registration(registration()?),
+    pub fn new(
+        poses: Option<&'a PoseReceiver>,
+        trusted: bool,
+    ) -> Result<LiveLocator<'a>, RunError> {
+        let locator = match poses {
+            Some(_) if trusted => None,
+            Some(_) => Some(Locator::checking()?),
+            None => Some(Locator::finding()?),
         };
-        Ok(LiveLocator { by, counts: LocatedCounts::default() })
+        Ok(LiveLocator { poses, locator, with_pose: 0, without_pose: 0 })
     }
 
     /// Counts so far.
     pub fn counts(&self) -> LocatedCounts {
-        self.counts
+        LocatedCounts {
+            with_pose: self.with_pose,
+            without_pose: self.without_pose,
+            registration: self.locator.as_ref().map(Locator::located),
+        }
     }
 
-    /// Sets the pose and twist of a sweep; `sweep_ns` is the duration of one. Returns whether a
-    /// pose was found.
+    /// Sets the pose and twist of a sweep; `sweep_ns` is the duration of one. Returns whether it
+    /// could be located: poses may be lacking.
     ///
     /// # Errors
     /// [`RunError::Allocation`].
@@ -67,32 +68,17 @@ impl<'a> LiveLocator<'a> {
         sweep: &mut LiveSweep,
         sweep_ns: u64,
     ) -> Result<bool, RunError> {
-        let (counts, data) = (&mut self.counts, &mut sweep.data);
-        let (pose, twist) = match &mut self.by {
-            By::Poses(poses) => match poses.at(sweep.stamp_ns, sweep_ns) {
-                Some(found) => {
-                    counts.by_poses += 1;
-                    found
-                }
-                None => {
-                    counts.without_pose += 1;
-                    data.world_from_vehicle = Pose::IDENTITY;
-                    return Ok(false);
-                }
-            },
-            By::Registration(odometry) => {
-                let (stamp_s, points) = (data.stamp_s, &data.points);
-                let found = odometry
-                    .step(|odometry| Ok::<_, RunError>(odometry.locate(stamp_s, points, rig)))?;
-                *match found.pose_status {
-                    PoseStatus::Start | PoseStatus::Registered => &mut counts.registered,
-                    PoseStatus::Degenerate => &mut counts.degenerate,
-                    PoseStatus::Lost => &mut counts.lost,
-                } += 1;
-                (found.world_from_vehicle, found.twist)
-            }
-        };
-        (data.world_from_vehicle, data.twist) = (pose, twist);
+        let data = &mut sweep.data;
+        if let Some(poses) = self.poses {
+            let Some((pose, twist)) = poses.at(sweep.stamp_ns, sweep_ns) else {
+                self.without_pose += 1;
+                data.world_from_vehicle = Pose::IDENTITY;
+                return Ok(false);
+            };
+            (data.world_from_vehicle, data.twist) = (pose, twist);
+            self.with_pose += 1;
+        }
+        self.locator.as_mut().map_or(Ok(()), |locator| locator.locate(rig, data))?;
         Ok(true)
     }
 }

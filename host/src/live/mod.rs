@@ -161,7 +161,7 @@ impl Plan<'_> {
             deadline,
             drive,
             objects: self.objects()?,
-            locator: locating::LiveLocator::new(poses)?,
+            locator: locating::LiveLocator::new(poses, args.trust_poses)?,
             outlets: Outlets {
                 stream: args.results.send.map(FlowStream::to).transpose()?,
                 recording: pairs.as_ref().zip(kept),

@@ -151,13 +151,14 @@ impl LiveSummary {
         let PacketCounts { packets, missing, duplicates, reordered, foreign, .. } = self.packets;
         let overflowed = self.overflowed.map_or("unknown".into(), |n| n.to_string());
         let latency = self.latency_ms.map_or("none".into(), |latency| latency.line());
+        let located = self.located.registration.map_or(String::new(), |located| located.text());
         let digest = self.digest.as_ref().map_or(String::new(), |d| format!("digest {d}\n"));
         format!(
             "{:.1} s: {done} sweeps, {pairs} pairs; {left_out} dropped, {late} later than \
              {:.0} ms, {incomplete} incomplete, {resets} resets\n\
              packets: {packets}, missing {missing} (dropped by this system: {overflowed}), \
              duplicate {duplicates}, out of order {reordered}; foreign datagrams {foreign}\n\
-             latency from the last packet to flow: {latency}\n{digest}",
+             {located}latency from the last packet to flow: {latency}\n{digest}",
             self.seconds, self.deadline_ms
         )
     }
