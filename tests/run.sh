@@ -80,8 +80,11 @@ if rustup toolchain install $nightly --profile minimal -c miri -c rust-src >/dev
     # Its memory is borrowed permanently.
     MIRIFLAGS=-Zmiri-ignore-leaks \
         miri --target riscv64gc-unknown-linux-gnu -p raywake-embed
-    miri --target riscv64gc-unknown-linux-gnu -p raywake-core -- continuity:: digest:: dropped:: \
-        output:: params:: pose:: surface:: footprint:: prepare::tests::every prepare::tests::static
+    miri --target riscv64gc-unknown-linux-gnu -p raywake-core --features pipeline -- continuity:: \
+        cues:: digest:: footprint:: frame:: motion_compensation:: output:: params:: pose:: \
+        prepare:: record:: surface:: weights:: map::tests::b map::tests::p stages::compact:: \
+        stages::grid::columns:: stages::grid::shift:: stages::grid::walk:: \
+        stages::map::reduce_by_key:: tracklet::ekf::tests::the_gate tracklet::tests::t
 else
     echo "skipped: Miri cannot be installed"
 fi
