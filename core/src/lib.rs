@@ -24,7 +24,8 @@
 //! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].
 //! - The sparse map of appendix B: [`map`].
 //! - Supporting modules: [`mod@params`], [`weights`], [`team`] (threads), [`digest`],
-//!   [`mod@counters`], [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`], [`ctrv`].
+//!   [`mod@counters`], [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`],
+//!   [`plausible`], [`ctrv`].
 
 pub mod continuity;
 #[cfg(feature = "pipeline")]
@@ -53,6 +54,7 @@ pub mod params;
 pub mod perceive;
 #[cfg(feature = "pipeline")]
 pub mod pipeline;
+pub mod plausible;
 pub mod pose;
 #[cfg(feature = "pipeline")]
 pub mod prepare;

@@ -214,11 +214,14 @@ impl Executor {
 
 impl Drop for Executor {
     fn drop(&mut self) {
+        let grace = self.timeout.max(GRACE);
         let idle = !self.in_flight
-            || match self.gpu.wait(self.fence, self.timeout.max(GRACE)) {
+            || match self.gpu.wait(self.fence, grace) {
                 Ok(finished) => finished,
-                // The work of a lost device counts as finished once it has been waited for.
-                Err(result) => result == vk::Result::ERROR_DEVICE_LOST,
+                // A driver may report a lost device that is still working.
+                Err(result) => {
+                    result == vk::Result::ERROR_DEVICE_LOST && self.gpu.is_idle_within(grace)
+                }
             };
         // A run in progress uses the objects and might never end: then all are leaked, with the
         // device.

@@ -15,6 +15,8 @@ use crate::instance::Instance;
 use ash::vk;
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
+use std::sync::mpsc;
+use std::thread;
 use std::time::Duration;
 
 /// What an executor has created so far.
@@ -129,6 +131,21 @@ impl Gpu {
             Err(vk::Result::TIMEOUT) => Ok(false),
             Err(result) => Err(result),
         }
+    }
+
+    /// Whether the device becomes idle in time. The call that waits for this has no limit of its
+    /// own; if it does not return, neither does its thread.
+    pub fn is_idle_within(&self, timeout: Duration) -> bool {
+        let (device, (idle, found)) = (self.raw.clone(), mpsc::channel());
+        let wait = move || {
+            // SAFETY: the device is destroyed only after this has returned, and nobody submits. A
+            // lost device is idle, too.
+            let _ = unsafe { device.device_wait_idle() };
+            // Nobody is listening any more if this took too long.
+            let _ = idle.send(());
+        };
+        let started = thread::Builder::new().spawn(wait);
+        started.is_ok() && found.recv_timeout(timeout).is_ok()
     }
 
     /// Reads timestamps as (ticks, available), without waiting for any. Those that cannot be read

@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 
 use common::{Outcome, SMALL, Temp};
-use raywake_faulty_layer::{FAULT, GARBAGE, NAME, NAMES, NULL, environment};
+use raywake_faulty_layer::{BUSY, FAULT, GARBAGE, NAME, NAMES, NULL, environment};
 
 /// Vulkan result codes.
 const OUT_OF_HOST_MEMORY: i32 = -1;
@@ -174,4 +174,17 @@ fn the_scalar_backend_takes_over_during_a_run() {
             assert_eq!(s["pairs"].as_u64(), Some(pairs), "{fault}");
         }
     }
+}
+
+/// A driver that reports a lost device which is still working, as late as in the last sweep: its
+/// memory is not freed under it.
+#[test]
+fn a_lost_device_that_is_still_working() {
+    let Some(t) = drive() else { return };
+    // Long enough for the program to end meanwhile.
+    let slow = ["--set", "em_rounds=100"];
+    let last = format!("vkWaitForFences {} {BUSY}", SWEEPS + 2);
+    let o = run(&t, &last, &slow);
+    o.succeeded();
+    assert!(o.stderr.contains("device lost during `flow`"), "{}", o.stderr);
 }

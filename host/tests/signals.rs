@@ -52,7 +52,10 @@ fn no_lack_of_memory_aborts() {
             let kib = mib << 10;
             let command = format!("run {data} --backend scalar --out {out}");
             let line = format!("ulimit -v {kib}; exec {program} {command}");
-            let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
+            // A backtrace must not be printed where there is no memory for one.
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &line]).env("RUST_BACKTRACE", "1");
+            let o = Outcome::of(shell.output().unwrap());
             assert!(matches!(o.code, Some(0 | 6)), "{kib}: {:?}, {}", o.code, o.stderr);
             o.code.unwrap()
         })
@@ -86,6 +89,29 @@ fn a_second_interrupt_ends_at_once() {
         thread::sleep(Duration::from_millis(100));
     };
     assert_eq!(end.code(), Some(130));
+}
+
+/// Open tracks are solved with what is known, and everything is written.
+#[test]
+fn an_interrupt_ends_tracking_in_order() {
+    let t = Temp::new();
+    t.drive(1200);
+    let [data, out] = ["drive", "out"].map(|name| t.path().join(name));
+    let mut child = common::command(&["track", data.to_str().unwrap(), "--front-end", "variance"])
+        .args(["--out", out.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    thread::sleep(Duration::from_secs(1));
+    let since = Instant::now();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.unwrap().success() && child.try_wait().unwrap().is_none());
+    let o = Outcome::of(child.wait_with_output().unwrap());
+    assert_eq!(o.code, Some(130), "{}", o.stderr);
+    assert!(since.elapsed() < Duration::from_secs(10));
+    assert!(out.join("tracks.feather").is_file());
+    assert_eq!(o.summary(&out.join("summary.json"))["interrupted"], true);
 }
 
 #[test]

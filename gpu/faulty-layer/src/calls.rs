@@ -1,6 +1,6 @@
 //! The functions that may fail.
 
-use crate::{FAULT, GARBAGE, NULL};
+use crate::{BUSY, FAULT, GARBAGE, NULL};
 use ash::vk::{self, Handle};
 use std::collections::BTreeMap;
 use std::ffi::c_void;
@@ -55,6 +55,7 @@ fn call(name: &str, next: impl FnOnce() -> vk::Result) -> vk::Result {
     match fault(name) {
         None => next(),
         Some(NULL) => vk::Result::SUCCESS,
+        Some(BUSY) => vk::Result::ERROR_DEVICE_LOST,
         Some(GARBAGE) => littered(next()),
         Some(result) => {
             let _ = (name == "vkWaitForFences").then(next);

@@ -3,9 +3,9 @@
 //!
 //! The loader's variables enable it ([`environment`]), and [`FAULT`] says what fails:
 //! `vkQueueSubmit 3 -4` makes the third call and every later one return `VK_ERROR_DEVICE_LOST`;
-//! with `each` appended, only every third one. Waits are still carried out, so that nothing is
-//! running any more when the device is reported lost. The layer serves one instance and one device
-//! at a time.
+//! with `each` appended, only every third one. Except with [`BUSY`], waits are still carried out,
+//! so that nothing is running any more when the device is reported lost. The layer serves one
+//! instance and one device at a time.
 
 mod calls;
 mod chain;
@@ -17,8 +17,8 @@ use std::path::Path;
 pub const NAME: &str = "VK_LAYER_RAYWAKE_faulty";
 
 /// The variable with the function that fails, the number of the first call that does, and what it
-/// returns: a negative or positive `VkResult`, or [`NULL`] or [`GARBAGE`]; with `each` appended,
-/// the multiples of that number fail instead of all calls from it on.
+/// returns: a negative or positive `VkResult`, [`NULL`], [`GARBAGE`] or [`BUSY`]; with `each`
+/// appended, the multiples of that number fail instead of all calls from it on.
 pub const FAULT: &str = "RAYWAKE_FAULT";
 
 /// In place of a result: `vkMapMemory` succeeds, with a null pointer.
@@ -26,6 +26,9 @@ pub const NULL: i32 = 1000;
 
 /// In place of a result: the call succeeds, and all mapped memory is filled with ones.
 pub const GARBAGE: i32 = 1001;
+
+/// In place of a result: the device is reported lost without any waiting, while it is working.
+pub const BUSY: i32 = 1002;
 
 /// Functions that may fail.
 pub use calls::NAMES;

@@ -237,8 +237,9 @@ pub unsafe extern "C" fn raywake_memory_needed(
     bytes: *mut usize,
     error: *mut ErrorText,
 ) -> CallStatus {
-    // SAFETY, here and below: guaranteed by the caller.
+    // SAFETY: guaranteed by the caller.
     let found = unsafe { CreateOptions::read(options) }.and_then(|(options, _)| needed(&options));
+    // SAFETY: guaranteed by the caller.
     let result = found.and_then(|found| unsafe { put(found, bytes, "bytes") });
     // SAFETY: guaranteed by the caller.
     unsafe { report(result, error) }

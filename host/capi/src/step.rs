@@ -200,12 +200,11 @@ impl SweepInput {
         };
         let time = optional(self.time_s, self.time_stride, 4, "time")?;
         let sensor = optional(self.sensor, self.sensor_stride, 1, "sensor")?;
-        // SAFETY, of the three: guaranteed by the caller.
-        Ok((0..count).map(move |n| Point {
-            position: unsafe { xyz.get(n) },
-            intensity: 0.0,
-            offset_s: unsafe { time.get(n) },
-            sensor: u32::from(unsafe { sensor.get::<u8>(n) }),
+        Ok((0..count).map(move |n| {
+            // SAFETY: guaranteed by the caller.
+            let (position, offset_s, sensor) =
+                unsafe { (xyz.get(n), time.get(n), sensor.get::<u8>(n)) };
+            Point { position, intensity: 0.0, offset_s, sensor: u32::from(sensor) }
         }))
     }
 }

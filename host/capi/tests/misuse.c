@@ -99,6 +99,8 @@ static void options_that_are_none(void) {
     EXPECT(raywake_memory_needed(&o, &bytes, &error), INVALID_ARGUMENT);
     o = options(), o.ground_m = NAN;
     EXPECT(raywake_memory_needed(&o, &bytes, &error), INVALID_ARGUMENT);
+    o = options(), o.ground_m = -1e16;
+    EXPECT(raywake_memory_needed(&o, &bytes, &error), INVALID_ARGUMENT);
     o = options(), o.points_max = SIZE_MAX;
     EXPECT(raywake_memory_needed(&o, &bytes, &error), MEMORY_TOO_SMALL);
     o = options();
@@ -170,6 +172,10 @@ static void sweeps_that_are_none(void) {
         .stamp_s = 1, .world_from_vehicle = &pose, .twist = &twist, .count = 4, .xyz = xyz};
     raywake_sweep s = good;
     s.stamp_s = NAN;
+    EXPECT(raywake_step(e, &s, &result, &error), INVALID_ARGUMENT);
+    raywake_pose away = pose;
+    away.translation[1] = 1e18;
+    s = good, s.world_from_vehicle = &away;
     EXPECT(raywake_step(e, &s, &result, &error), INVALID_ARGUMENT);
     s = good, s.world_from_vehicle = NULL;
     EXPECT(raywake_step(e, &s, &result, &error), INVALID_ARGUMENT);
@@ -274,6 +280,9 @@ static uint64_t drive(const char *path, int disturbed, int all) {
     free(objects), free(tracklets), free(columns), free(flow), free(points), free(memory);
     fclose(file);
     CHECK(sweeps > 1);
+#ifdef COUNT_ALLOCATIONS
+    CHECK(allocated() > 0); /* before the first sweep */
+#endif
     return digest;
 }
 

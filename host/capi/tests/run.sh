@@ -70,9 +70,9 @@ exported=$(nm -D --defined-only "$out/lib/libraywake.so" | awk '$2 == "T" {print
 
 misuse() { gcc "${flags[@]}" "$@" host/capi/tests/misuse.c -o "$out/misuse" "${static[@]}"; }
 misuse -DCOUNT_ALLOCATIONS
-echo "nothing allocated: $("$out/misuse" "$out/short.sweeps")"
+"$out/misuse" "$out/short.sweeps" | sed 's/^/allocations: /'
 misuse -fsanitize=address,undefined -fno-sanitize-recover=all
-echo "address sanitizer: $("$out/misuse" "$out/short.sweeps")"
+"$out/misuse" "$out/short.sweeps" | sed 's/^/address sanitizer: /'
 misuse
 # Valgrind runs all threads on one core: without fairness, the disturbing thread would keep it.
 valgrind --quiet --error-exitcode=1 --fair-sched=yes \

@@ -225,7 +225,7 @@ impl FlowEstimator {
         if place.pose.is_some() == self.odometry.is_some() {
             return Err(SweepError::Pose);
         }
-        if place.is_valid() { Ok(()) } else { Err(SweepError::NotFinite) }
+        if place.is_valid() { Ok(()) } else { Err(SweepError::Implausible) }
     }
 
     /// Pose and twist of the sweep just received.

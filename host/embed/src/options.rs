@@ -3,6 +3,7 @@
 use core::fmt;
 
 use raywake_core::params::{Profile, ProfileError};
+use raywake_core::plausible::FRAME_MAX_M;
 use raywake_core::sweep::{Point, Rig};
 use raywake_core::weights::WeightsError;
 
@@ -68,8 +69,9 @@ impl EstimatorOptions {
 }
 
 fn is_valid(rig: &Rig) -> bool {
-    let places = !rig.sensors.is_empty() && rig.sensors.iter().all(is_pose);
-    places && rig.timing.is_valid() && rig.ground_m.is_finite() && is_box(rig)
+    let places =
+        !rig.sensors.is_empty() && rig.sensors.iter().all(|pose| is_pose(pose, FRAME_MAX_M));
+    places && rig.timing.is_valid() && rig.ground_m.abs() <= FRAME_MAX_M && is_box(rig)
 }
 
 fn is_box(rig: &Rig) -> bool {

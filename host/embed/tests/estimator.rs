@@ -166,13 +166,17 @@ fn invalid_sets_of_options() {
 /// Gives an estimator one invalid sweep after another.
 fn give_invalid_sweeps(estimator: &mut FlowEstimator, here: SweepPlace, points: &[Point]) {
     let far = Some(Pose { translation: glam::DVec3::NAN, ..Pose::IDENTITY });
+    let away = glam::DVec3::Y * 1e9;
+    let away = Some(Pose { translation: away, ..Pose::IDENTITY });
     let odd = Some(Pose { rotation: glam::DQuat::IDENTITY * 2.0, ..Pose::IDENTITY });
     let fast = Some(Twist { linear: glam::DVec3::INFINITY, ..Twist::ZERO });
     for (place, why) in [
-        (SweepPlace { stamp_s: f64::NAN, ..here }, SweepError::NotFinite),
-        (SweepPlace { pose: far, ..here }, SweepError::NotFinite),
-        (SweepPlace { pose: odd, ..here }, SweepError::NotFinite),
-        (SweepPlace { twist: fast, ..here }, SweepError::NotFinite),
+        (SweepPlace { stamp_s: f64::NAN, ..here }, SweepError::Implausible),
+        (SweepPlace { stamp_s: 1e11, ..here }, SweepError::Implausible),
+        (SweepPlace { pose: far, ..here }, SweepError::Implausible),
+        (SweepPlace { pose: away, ..here }, SweepError::Implausible),
+        (SweepPlace { pose: odd, ..here }, SweepError::Implausible),
+        (SweepPlace { twist: fast, ..here }, SweepError::Implausible),
         (SweepPlace { pose: None, ..here }, SweepError::Pose),
     ] {
         assert_eq!(estimator.step(&SingleThread, &place, points.iter().copied()), Err(why));

@@ -8,6 +8,8 @@ Poses come from registration or, with `-p find_poses:=false`, from tf (`world_fr
 frame). What is published belongs to the cloud before the last.
 """
 
+from array import array
+
 import numpy as np
 import raywake
 
@@ -190,7 +192,8 @@ def main():
                 fields=fields,
                 point_step=OUT.itemsize,
                 row_step=found.nbytes,
-                data=found.tobytes(),
+                # Of bytes, rclpy would check every one.
+                data=array("B", found.tobytes()),
                 is_dense=False,
             )
 

@@ -211,6 +211,7 @@ class Refused(unittest.TestCase):
         self.refuses(TypeError, "stamp", self.points)
         self.refuses(ValueError, "given with every", self.points, 0.0)
         self.refuses(ValueError, "finite", self.points, np.nan, eye)
+        self.refuses(ValueError, "possible", self.points, 1e300, eye)
         self.refuses(ValueError, "not finite", self.points, 0.0, np.full((4, 4), np.nan))
         self.refuses(ValueError, "rotation", self.points, 0.0, 2 * np.diag([1, 1, 1, 0.5]))
         self.refuses(ValueError, "matrix", self.points, 0.0, np.eye(3))

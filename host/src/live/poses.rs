@@ -9,6 +9,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use glam::{DQuat, DVec3};
+use raywake_core::plausible::{WORLD_MAX_M, is_within};
 use raywake_core::pose::{Pose, Twist};
 use raywake_io::Error;
 use raywake_io::source::rigid;
@@ -92,7 +93,7 @@ fn parse(datagram: &[u8]) -> Option<Timed> {
     let place = [0, 1, 2].map(number);
     let stamp_ns = u64::from_le_bytes(*stamp);
     let pose = rigid(place, [3, 4, 5, 6].map(number)).ok()?;
-    (stamp_ns > 0).then_some((stamp_ns, pose))
+    (stamp_ns > 0 && is_within(pose.translation, WORLD_MAX_M)).then_some((stamp_ns, pose))
 }
 
 impl RecentPoses {
@@ -209,9 +210,10 @@ mod tests {
         track.take(b"RWP1");
         track.take(&datagram(5, [0.0; 7]));
         track.take(&datagram(5, [f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        track.take(&datagram(5, [1e308, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
         track.take(&datagram(5, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
         track.take(&datagram(5, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
-        assert_eq!(track.counts, PoseCounts { poses: 1, foreign: 3, late: 1 });
+        assert_eq!(track.counts, PoseCounts { poses: 1, foreign: 4, late: 1 });
         (6..2000).for_each(|ns| track.take(&datagram(ns, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])));
         assert_eq!(track.poses.len(), KEPT);
         let mut jump = moving(1..2);

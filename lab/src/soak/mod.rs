@@ -82,6 +82,9 @@ fn soak(args: &Args) -> Result<(), Box<dyn Error>> {
     let subject = format!("{}, {}", source.describe(), soak.drive.backend().device());
     let (hours, findings) = (soak.hours(), &soak.findings);
     findings.report(&subject, hours, &args.out)?.print(&args.out);
+    if args.faulty_layer.is_some() && findings.devices_failed == 0 {
+        return Err("too short: no device was lost".into());
+    }
     findings.verdict().map_or(Ok(()), |what| Err(what.into()))
 }
 

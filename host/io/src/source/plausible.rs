@@ -1,21 +1,13 @@
-//! Plausibility limits for recordings of any format: numbers that are finite but impossible for a
-//! vehicle. Beyond them arithmetic overflows, and returns end up in the wrong places.
+//! Plausibility of recordings of any format.
 
 use glam::DVec3;
+use raywake_core::plausible::{FRAME_MAX_M, WORLD_MAX_M, is_time, is_within};
 use raywake_core::pose::Pose;
 
 use super::Overview;
 
 /// Largest distance of a drive from its first pose, m; positions beyond are typing errors.
 const REACH_MAX_M: f64 = 1e6;
-/// Largest distance of the first pose from the origin of the world, m: map grids have origins some
-/// thousands of kilometres away.
-const WORLD_MAX_M: f64 = 1e8;
-/// Largest distance of a sensor or the ground from the origin of the returns, m: there,
-/// neighbouring coordinates of a return are 1 mm apart.
-const FRAME_MAX_M: f64 = 1e4;
-/// Largest accepted time, s: 1970 is 1.8e9 s ago.
-pub(super) const TIME_MAX_S: f64 = 1e10;
 /// Shortest time between two sweeps, s.
 const STEP_MIN_S: f64 = 1e-6;
 
@@ -27,15 +19,14 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
         place(sensor.translation).map_err(|what| format!("sensor {n}: {what}"))?;
     }
     let first = track.poses.first().map_or(DVec3::ZERO, |pose| pose.translation);
-    if !within(first, WORLD_MAX_M) {
+    if !is_within(first, WORLD_MAX_M) {
         return Err(format!("the first pose is impossibly far away, at {:?} m", first.to_array()));
     }
     for (frame, pose) in frames.iter().zip(&track.poses) {
         reach(first, pose).map_err(|what| format!("the pose of frame {frame}: {what}"))?;
     }
     for (frame, &stamp_s) in frames.iter().zip(&track.stamps_s) {
-        // Written this way because NaN is in no range.
-        if !(-TIME_MAX_S..=TIME_MAX_S).contains(&stamp_s) {
+        if !is_time(stamp_s) {
             return Err(format!("frame {frame} has an impossible time of {stamp_s:e} s"));
         }
     }
@@ -52,7 +43,7 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
 /// `Err` if a pose is out of reach of a drive whose first pose is at `first`.
 pub(super) fn reach(first: DVec3, pose: &Pose) -> Result<(), String> {
     let away = pose.translation - first;
-    match pose.rotation.is_finite() && within(away, REACH_MAX_M) {
+    match pose.rotation.is_finite() && is_within(away, REACH_MAX_M) {
         true => Ok(()),
         false => Err(format!(
             "impossible: {:.3e} m from the first pose, or a rotation that is not finite",
@@ -68,13 +59,8 @@ pub fn ground(height_m: f64) -> Result<(), String> {
 
 /// `Err` if no part of a vehicle can be at this position in the frame of the returns, m.
 pub fn place(place: DVec3) -> Result<(), String> {
-    match within(place, FRAME_MAX_M) {
+    match is_within(place, FRAME_MAX_M) {
         true => Ok(()),
         false => Err(format!("at {:?} m, {FRAME_MAX_M:e} m at most", place.to_array())),
     }
-}
-
-/// False for NaN.
-fn within(place: DVec3, most_m: f64) -> bool {
-    place.is_finite() && place.abs().max_element() <= most_m
 }

@@ -8,9 +8,10 @@
 
 use std::path::Path;
 
+use raywake_core::plausible::is_time;
 use raywake_core::pose::Pose;
 
-use super::plausible::{TIME_MAX_S, reach};
+use super::plausible::reach;
 use super::poses::{pose_from, rigid};
 use super::trajectory::Trajectory;
 use super::{npy, text, whole};
@@ -117,7 +118,7 @@ fn row(path: &Path, place: String, numbers: &[f64]) -> Result<PoseRow, Error> {
         [time_s, x, y, z, a, b, c, d] => {
             let pose = rigid([x, y, z], [a, b, c, d]).map_err(wrong)?;
             // Written this way because NaN is in no range.
-            if !(-TIME_MAX_S..=TIME_MAX_S).contains(&time_s) {
+            if !is_time(time_s) {
                 return Err(wrong(&format!("an impossible time of {time_s} s")));
             }
             (Some(time_s), pose)
