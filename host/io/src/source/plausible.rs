@@ -64,3 +64,47 @@ pub fn place(place: DVec3) -> Result<(), String> {
         false => Err(format!("at {:?} m, {FRAME_MAX_M:e} m at most", place.to_array())),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::poses::PoseTrack;
+    use raywake_core::sweep::{Rig, Timing};
+
+    #[test]
+    fn what_no_vehicle_has() {
+        let at = |x| Pose { translation: DVec3::X * x, ..Pose::IDENTITY };
+        let overview = |ground_m, sensor_m, poses_m: [f64; 2], stamps_s: [f64; 2]| {
+            let sensors = [at(sensor_m)].into_iter().collect();
+            check(&Overview {
+                name: String::new(),
+                rig: Rig {
+                    sensors,
+                    timing: Timing::AtStamp,
+                    distorted: false,
+                    ground_m,
+                    own_vehicle: None,
+                },
+                frames: vec![7, 8],
+                track: PoseTrack { poses: poses_m.map(at).into(), stamps_s: stamps_s.into() },
+                epoch_ns: 0,
+                trusted: false,
+                notes: Vec::new(),
+            })
+        };
+        let near = [1e8 - 1e6, 1e8];
+        assert_eq!(overview(-1e4, 1e4, near, [-1e10, 1e10]), Ok(()));
+        for (found, words) in [
+            (overview(-1.1e4, 0.0, near, [0.0, 1.0]), "the ground"),
+            (overview(f64::NAN, 0.0, near, [0.0, 1.0]), "the ground"),
+            (overview(0.0, 1e300, near, [0.0, 1.0]), "sensor 0"),
+            (overview(0.0, 0.0, [1.1e8; 2], [0.0, 1.0]), "first pose"),
+            (overview(0.0, 0.0, [0.0, 1.1e6], [0.0, 1.0]), "frame 8"),
+            (overview(0.0, 0.0, [0.0, f64::INFINITY], [0.0, 1.0]), "frame 8"),
+            (overview(0.0, 0.0, near, [0.0, 1.1e10]), "frame 8"),
+            (overview(0.0, 0.0, near, [0.0, 1e-7]), "frame 8"),
+        ] {
+            assert!(found.as_ref().is_err_and(|what| what.contains(words)), "{words}: {found:?}");
+        }
+    }
+}
