@@ -53,13 +53,17 @@ fn inside(c: &ColumnFlow, object: &ObjectState, beside: f64) -> bool {
     at.x.abs() <= 0.5 * object.size[0] + beside && at.y.abs() <= 0.5 * object.size[1] + beside
 }
 
-/// Calls `each` with the columns of every pair of a drive, and the objects at the pair's first
-/// sweep.
-fn follow(drive: &Drive, mut each: impl FnMut(&[ColumnFlow], &[ObjectState])) {
+/// Calls `each` with the columns of every pair of consecutive sweeps, and the objects at the pair's
+/// first one.
+fn follow(
+    drive: &Drive,
+    sweeps: impl Iterator<Item = usize>,
+    mut each: impl FnMut(&[ColumnFlow], &[ObjectState]),
+) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
     let mut pipeline = setup.drive(setup.scalar());
     let (mut before, mut objects) = (Vec::new(), Vec::new());
-    for index in 0..drive.sweeps() {
+    for index in sweeps {
         let now = drive.sweep(index);
         let stepped = pipeline.step(&sweep(&now), &before).unwrap_or_else(|e| panic!("{e}"));
         each(stepped.output.flows.map_or(&[][..], |flows| flows.columns), &objects);
@@ -68,16 +72,23 @@ fn follow(drive: &Drive, mut each: impl FnMut(&[ColumnFlow], &[ObjectState])) {
     }
 }
 
-/// Velocity errors (m/s, world axes) of old matched columns, by the object they lie in.
+/// Velocity errors (m/s, world axes) of old matched columns, with the object they lie in.
+fn errors_of(columns: &[ColumnFlow], objects: &[ObjectState]) -> Vec<(u32, DVec2)> {
+    let old = columns.iter().filter(|c| c.basis == FlowBasis::Matched && c.age >= AGE);
+    let error = |c: &ColumnFlow| {
+        let object = objects.iter().find(|o| inside(c, o, 0.0))?;
+        let found = DVec2::from_array(c.velocity_world_mps.map(f64::from));
+        Some((object.id, found - object.velocity_world.truncate()))
+    };
+    old.filter_map(error).collect()
+}
+
+/// The same of a whole drive, by object.
 fn errors(drive: &Drive) -> BTreeMap<u32, Vec<DVec2>> {
     let mut errors = BTreeMap::<u32, Vec<DVec2>>::new();
-    follow(drive, |columns, objects| {
-        for c in columns.iter().filter(|c| c.basis == FlowBasis::Matched && c.age >= AGE) {
-            if let Some(object) = objects.iter().find(|o| inside(c, o, 0.0)) {
-                let found = DVec2::from_array(c.velocity_world_mps.map(f64::from));
-                let off = found - object.velocity_world.truncate();
-                errors.entry(object.id).or_default().push(off);
-            }
+    follow(drive, 0..drive.sweeps(), |columns, objects| {
+        for (id, off) in errors_of(columns, objects) {
+            errors.entry(id).or_default().push(off);
         }
     });
     errors
@@ -120,6 +131,21 @@ fn tracklets_recover_the_velocity_of_moving_objects() {
 }
 
 /// Past parked cars, houses and trees, where only the vehicle moves.
+/// Where a sweep is missing, tracklets keep their age and velocity.
+#[test]
+fn tracklets_outlive_a_lost_sweep() {
+    let (lost, [_, (_, drive), _]) = (30, drives());
+    let mut pairs = Vec::new();
+    follow(&drive, (0..lost + 4).filter(|n| *n != lost), |columns, objects| {
+        let errors = errors_of(columns, objects).into_iter().map(|(_, off)| off);
+        pairs.push(errors.collect::<Vec<_>>());
+    });
+    // Those with the gap and after it.
+    for errors in &pairs[lost..] {
+        assert!(errors.len() > COLUMNS_MIN && together(errors) < LIMIT, "{}", errors.len());
+    }
+}
+
 #[test]
 fn nothing_moves_in_a_static_street() {
     // Counts of moving columns and of all: on parked cars, and away from any object.
@@ -129,7 +155,7 @@ fn nothing_moves_in_a_static_street() {
         scene.objects.retain(|o| o.is_static());
         let path = Path::from(State { x: -20.0, y: -1.75, yaw: 0.0, speed: 12.0 });
         let drive = Drive::through(scene, path, seed, Options { sweeps: 40, ..Options::default() });
-        follow(&drive, |columns, objects| {
+        follow(&drive, 0..drive.sweeps(), |columns, objects| {
             for c in columns {
                 let is_car = |o: &&ObjectState| o.class == Class::Car && inside(c, o, 0.0);
                 let count = if objects.iter().any(|o| is_car(&o)) {
