@@ -133,14 +133,19 @@ else
 fi
 
 # The same bits on another instruction set: an emulator wrapped as one more program.
+emulated() {
+    printf '#!/bin/sh\nexec qemu-aarch64-static %s "$@"\n' "$2" >"$1"
+    chmod +x "$1"
+    others+=("$1")
+}
 aarch64() {
     [ "$(uname -m)" = x86_64 ] || return 1
     command -v apt-get >/dev/null || return 1
     install gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || return 1
     static aarch64 || return 1
-    printf '#!/bin/sh\nexec qemu-aarch64-static %s "$@"\n' "$PWD/$program" >target/raywake-aarch64
-    chmod +x target/raywake-aarch64
-    others+=(target/raywake-aarch64)
+    emulated target/raywake-aarch64 "$PWD/$program"
+    program=$(host/package/onboard.sh aarch64) || exit 1
+    emulated target/raywake-aarch64-onboard "-L /usr/aarch64-linux-gnu $PWD/$program"
 }
 aarch64 || echo "skipped: no aarch64 compiler, linker or emulator available"
 RAYWAKE_DIGEST_OF=$(printf "$PWD/%s:" "${others[@]}")
