@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs every check in one command. On Debian it installs what is missing, so that nothing is
 # skipped: the software Vulkan device, validation layers, spirv-val, a browser, compilers and
-# emulators for aarch64, Valgrind, Python's venv, Slurm and GNU parallel.
+# emulators for aarch64, Valgrind, Python's venv, Slurm, GNU parallel and debootstrap.
 #
 #   RAYWAKE_DATA=FOLDER   also run the tests on recorded drives found there
 set -euo pipefail
@@ -199,6 +199,21 @@ else
     echo "skipped: python3-venv cannot be installed"
 fi
 
+# In a Debian that has nothing else, with what the package says it needs.
+fresh_root() {
+    . /etc/os-release
+    { [ "$ID" = debian ] && [ "$(id -u)" = 0 ] && install debootstrap; } || return 1
+    local root=target/root digest
+    rm -rf "$root"
+    debootstrap --variant=minbase "$VERSION_CODENAME" "$root" >target/root.log 2>&1 || return 1
+    cp "$1" "$root/raywake.deb"
+    chroot "$root" apt-get install -y -qq --no-install-recommends ./raywake.deb >/dev/null || exit 1
+    digest=$(chroot "$root" raywake demo | grep ^digest) || exit 1
+    [ "$digest" = "$(cd target/installed && ../release/raywake demo | grep ^digest)" ] || exit 1
+    echo "installed in a fresh root: $digest"
+    rm -rf "$root"
+}
+
 say "the Debian package"
 if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
     cargo install --quiet --locked cargo-deb@3.8.0; }; then
@@ -211,6 +226,7 @@ if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
         usr/share/man/man1/raywake-live.1.gz; do
         [ -s "target/installed/$file" ] || { echo "$file is missing"; exit 1; }
     done
+    fresh_root "$package" || echo "skipped: a fresh Debian cannot be made here"
 else
     echo "skipped: no Debian package can be built here"
 fi

@@ -1,15 +1,18 @@
 #![forbid(unsafe_code)]
-//! What targets do with bytes: read them as a recording or as weights. Whatever the bytes are, this
-//! ends with an error or a sweep.
+//! What targets do with bytes: read them as a recording, as packets or as weights. Whatever the
+//! bytes are, this ends with an error or a sweep.
 
 use raywake_core::encoder::EncoderWeights;
 use raywake_core::stages::{background_filter, occupancy_constancy};
+use raywake_io::source::capture::assembly::Assembler;
+use raywake_io::source::capture::live::{LiveSensor, SensorModel};
 use raywake_io::source::decoder::damaged;
 use raywake_io::source::{OpenOptions, SweepData, Unlocated, open};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::sync::{LazyLock, Mutex, PoisonError};
+use std::time::Instant;
 use tempfile::TempDir;
 
 pub mod bundle;
@@ -80,6 +83,44 @@ fn read(path: &Path, topics: Vec<String>) {
         let pose = &sweep.world_from_vehicle;
         assert!(pose.rotation.is_finite() && pose.translation.is_finite(), "{pose:?}");
     }
+}
+
+/// Assembles sweeps from packets of the sensor that the first byte names. Every five bytes after it
+/// say how many packets follow, how many are lost before them, and which byte of each is replaced:
+/// a few make a revolution.
+pub fn packets(bytes: &[u8]) {
+    let Some((model, records)) = bytes.split_first() else { return };
+    let models =
+        [SensorModel::Vlp16, SensorModel::PuckHiRes, SensorModel::Vlp32c, SensorModel::Hdl32e];
+    let sensor = LiveSensor::of(models[usize::from(*model) % models.len()], None).expect("a model");
+    let (most, arrived, mut sent) = (sensor.returns_max(), Instant::now(), 0);
+    let (mut assembler, mut number) = (Assembler::new(sensor), 0);
+    for &[count, lost, low, high, value] in records.as_chunks().0 {
+        number += u32::from(lost);
+        for _ in 0..count {
+            let mut packet = velodyne(number);
+            match packet.get_mut(usize::from(u16::from_le_bytes([low, high]))) {
+                Some(byte) => *byte = value,
+                None => packet.truncate(usize::from(high) * usize::from(value)),
+            }
+            assembler.take(&packet, arrived, u64::from(number) * 1_327_000, |sweep| {
+                assert!(sweep.data.points.len() <= most, "more returns than there is room for");
+            });
+            (number, sent) = (number + 1, sent + 1);
+        }
+    }
+    let counts = assembler.counts();
+    assert_eq!(counts.packets + counts.foreign + counts.unsound, sent, "{counts:?}");
+}
+
+/// A packet of a Velodyne sensor, the `n`-th of a series: 75 make a revolution.
+fn velodyne(n: u32) -> Vec<u8> {
+    let block = |block: u32| {
+        let azimuth = ((n * 12 + block) * 40 % 36_000) as u16;
+        [&[0xff, 0xee][..], &azimuth.to_le_bytes(), &[0x88, 0x13, 51].repeat(32)].concat()
+    };
+    let blocks: Vec<u8> = (0..12).flat_map(block).collect();
+    [&blocks[..], &n.wrapping_mul(1327).to_le_bytes(), &[0x37, 0x22]].concat()
 }
 
 /// Reads bytes as weights of each kind.
