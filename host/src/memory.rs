@@ -18,7 +18,7 @@ pub fn probe_memory(bytes: u64) -> Result<(), RunError> {
 
 /// Ends the process with the error and the exit code of [`RunError::NoMemory`]. For the allocator
 /// to call: it allocates nothing.
-pub fn end(bytes: usize) {
+pub extern "C" fn end(bytes: usize) {
     let e = RunError::NoMemory { bytes: bytes as u64 };
     let _ = writeln!(std::io::stderr(), "raywake: {e}");
     std::process::exit(e.exit_code().into());

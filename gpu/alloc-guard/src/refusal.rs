@@ -15,8 +15,8 @@ thread_local! {
 pub struct OnRefusal<A: GlobalAlloc>(
     /// The allocator that does the work.
     pub A,
-    /// The function.
-    pub fn(usize),
+    /// The function. As an allocator must not unwind, a panic in it aborts.
+    pub extern "C" fn(usize),
 );
 
 impl<A: GlobalAlloc> OnRefusal<A> {
@@ -31,8 +31,7 @@ impl<A: GlobalAlloc> OnRefusal<A> {
     }
 }
 
-// SAFETY: every call is passed on unchanged, and so is its result; `checked` may unwind only if the
-// function does, for which the result is null and nothing has been allocated.
+// SAFETY: every call is passed on unchanged, and so is its result; nothing unwinds.
 unsafe impl<A: GlobalAlloc> GlobalAlloc for OnRefusal<A> {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's promise, passed on.
@@ -94,7 +93,7 @@ mod tests {
         static REFUSED: Cell<usize> = const { Cell::new(0) };
     }
 
-    fn note(bytes: usize) {
+    extern "C" fn note(bytes: usize) {
         REFUSED.set(bytes);
         // SAFETY: the size is not zero.
         assert!(unsafe { ALLOCATOR.alloc(layout(1000)) }.is_null());

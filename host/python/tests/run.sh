@@ -47,3 +47,13 @@ rm -rf "$out/demo"
 RAYWAKE_SWEEPS=$out/demo.sweeps \
     RAYWAKE_DIGEST=$("$program" demo --backend scalar --out "$out/demo" | sed -n 's/^digest *//p') \
     "$python" host/python/tests/test_raywake.py
+
+# For another architecture: that it is one; it is not run.
+if [ "$(uname -m)" = x86_64 ] && command -v aarch64-linux-gnu-gcc >/dev/null; then
+    PATH=$out/tools/bin:$PATH host/python/wheel.sh aarch64 "$out/other" release
+    "$python" -m zipfile -e "$out"/other/raywake-*aarch64.whl "$out/other"
+    readelf -h "$out"/other/raywake/*.so | grep -q AArch64
+    echo "the wheel for aarch64: $(stat -c %s "$out"/other/raywake-*aarch64.whl) bytes"
+else
+    echo "skipped: no wheel for aarch64, as there is no compiler"
+fi
