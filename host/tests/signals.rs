@@ -103,6 +103,12 @@ fn an_interrupt_ends_tracking_in_order() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    let since = Instant::now();
+    while !out.join("settings.toml").exists() {
+        assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
+        thread::sleep(Duration::from_millis(2));
+    }
+    // Signals are listened to right after that.
     thread::sleep(Duration::from_secs(1));
     let since = Instant::now();
     let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
