@@ -12,7 +12,7 @@ mkdir -p "$out"
 python3 -m venv "$out/tools" &&
     "$out/tools/bin/pip" install --quiet --disable-pip-version-check maturin==1.16.0 || exit 77
 
-rm -rf "$out/wheels" "$out/fresh"
+rm -rf "$out/wheels" "$out/other" "$out/fresh"
 # Built like the program: optimising across crates takes minutes and changes no result.
 PATH=$out/tools/bin:$PATH host/python/wheel.sh "$(uname -m)" "$out/wheels" release
 
