@@ -140,7 +140,7 @@ fn tracklets_outlive_a_lost_sweep() {
         let errors = errors_of(columns, objects).into_iter().map(|(_, off)| off);
         pairs.push(errors.collect::<Vec<_>>());
     });
-    // Those with the gap and after it.
+    // The pair with the gap, and those after it.
     for errors in &pairs[lost..] {
         assert!(errors.len() > COLUMNS_MIN && together(errors) < LIMIT, "{}", errors.len());
     }

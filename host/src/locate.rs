@@ -6,7 +6,7 @@ use std::time::Instant;
 use raywake_alloc_guard::Sealed;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::Rig;
-use raywake_io::source::{Source, SweepData};
+use raywake_io::source::SweepData;
 use raywake_registration::Odometry;
 use raywake_registration::odometry::{LEVER_ARM_M, Located, PoseStatus};
 use serde::Serialize;
@@ -123,24 +123,16 @@ impl Locator {
     /// Bytes of memory used by registration.
     pub const BYTES: u64 = size_of::<Odometry>() as u64;
 
-    /// Allocates what a source needs; trusted poses need nothing.
+    /// Allocates what sweeps with or without poses need; trusted poses need nothing.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
-    pub fn of<S: Source + ?Sized>(source: &S) -> Result<Option<Locator>, RunError> {
-        match source.is_located() {
-            true if source.overview().trusted => Ok(None),
-            true => Locator::checking().map(Some),
+    pub fn of(located: bool, trusted: bool) -> Result<Option<Locator>, RunError> {
+        match located {
+            true if trusted => Ok(None),
+            true => Locator::new(Some(PoseCheck::new())).map(Some),
             false => Locator::finding().map(Some),
         }
-    }
-
-    /// A locator for sweeps with poses.
-    ///
-    /// # Errors
-    /// [`RunError::NoMemory`].
-    pub fn checking() -> Result<Locator, RunError> {
-        Locator::new(Some(PoseCheck::new()))
     }
 
     /// A locator for sweeps without poses.

@@ -45,7 +45,7 @@ pub fn for_each_sweep<S: Source + ?Sized>(
 ) -> Result<SessionEnd, RunError> {
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
-    let mut locator = Locator::of(source)?;
+    let mut locator = Locator::of(source.is_located(), source.overview().trusted)?;
     let mut progress = Progress::new("sweep", sweeps.len(), quiet);
     let mut stopped = false;
     for (done, index) in sweeps.enumerate() {

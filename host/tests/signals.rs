@@ -7,32 +7,57 @@ mod common;
 
 use std::fs;
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use common::{BACKEND, Outcome, SMALL, Temp, run};
 
-/// Linux only, where the shell can limit memory.
+/// The outcome with this much memory. Linux only, where the shell can limit it.
+#[cfg(target_os = "linux")]
+fn within(mib: u32, arguments: &str) -> Outcome {
+    let line =
+        format!("ulimit -v {}; exec {} {arguments}", mib << 10, env!("CARGO_BIN_EXE_raywake"));
+    let mut shell = Command::new("sh");
+    // A backtrace must not be printed where there is no memory for one.
+    shell.args(["-c", &line]).env("RUST_BACKTRACE", "1");
+    Outcome::of(shell.output().unwrap())
+}
+
+/// The outcome of a command that is interrupted `after` a file of its results exists, and how long
+/// it took from there.
+fn interrupted(mut command: Command, file: &Path, after: Duration) -> (Outcome, Duration) {
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let since = Instant::now();
+    while !file.exists() {
+        assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
+        thread::sleep(Duration::from_millis(2));
+    }
+    thread::sleep(after);
+    let since = Instant::now();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    let o = Outcome::of(child.wait_with_output().unwrap());
+    assert_eq!(o.code, Some(130), "{}", o.stderr);
+    (o, since.elapsed())
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn too_little_memory_is_reported_before_the_first_sweep() {
     let t = Temp::new();
     t.drive(2);
-    let program = env!("CARGO_BIN_EXE_raywake");
-    let data = t.path().join("drive").display().to_string();
-    let out = t.path().join("out").display().to_string();
+    let [data, out] = ["drive", "out"].map(|name| t.path().join(name).display().to_string());
     // The program starts within 20 MB; the memory requested fits from 50 MB (registration) or from
     // 75 MB and more.
-    for (kib, command) in [
-        (70_000, format!("run {data} --backend scalar")),
-        (40_000, format!("odometry {data} --out {out}")),
-        (40_000, format!("map {data} --backend scalar --out {out}")),
-        (60_000, format!("track {data} --front-end variance --out {out}")),
+    for (mib, arguments) in [
+        (68, format!("run {data} --backend scalar")),
+        (39, format!("odometry {data} --out {out}")),
+        (39, format!("map {data} --backend scalar --out {out}")),
+        (58, format!("track {data} --front-end variance --out {out}")),
     ] {
-        let line = format!("ulimit -v {kib}; exec {program} {command}");
-        let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
-        o.failed(6, &["MB needed, which the system cannot provide"]);
+        within(mib, &arguments).failed(6, &["MB needed, which the system cannot provide"]);
     }
 }
 
@@ -42,21 +67,14 @@ fn too_little_memory_is_reported_before_the_first_sweep() {
 fn no_lack_of_memory_aborts() {
     let t = Temp::new();
     t.drive(2);
-    let program = env!("CARGO_BIN_EXE_raywake");
     let [data, out] = ["drive", "out"].map(|name| t.path().join(name).display().to_string());
     // From a little more than the program takes to start to more than a run needs.
     let codes: Vec<_> = (40..260)
         .step_by(5)
         .chain([4096])
         .map(|mib| {
-            let kib = mib << 10;
-            let command = format!("run {data} --backend scalar --out {out}");
-            let line = format!("ulimit -v {kib}; exec {program} {command}");
-            // A backtrace must not be printed where there is no memory for one.
-            let mut shell = Command::new("sh");
-            shell.args(["-c", &line]).env("RUST_BACKTRACE", "1");
-            let o = Outcome::of(shell.output().unwrap());
-            assert!(matches!(o.code, Some(0 | 6)), "{kib}: {:?}, {}", o.code, o.stderr);
+            let o = within(mib, &format!("run {data} --backend scalar --out {out}"));
+            assert!(matches!(o.code, Some(0 | 6)), "{mib} MiB: {:?}, {}", o.code, o.stderr);
             o.code.unwrap()
         })
         .collect();
@@ -97,25 +115,11 @@ fn an_interrupt_ends_tracking_in_order() {
     let t = Temp::new();
     t.drive(1200);
     let [data, out] = ["drive", "out"].map(|name| t.path().join(name));
-    let mut child = common::command(&["track", data.to_str().unwrap(), "--front-end", "variance"])
-        .args(["--out", out.to_str().unwrap()])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let since = Instant::now();
-    while !out.join("settings.toml").exists() {
-        assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
-        thread::sleep(Duration::from_millis(2));
-    }
-    // Signals are listened to right after that.
-    thread::sleep(Duration::from_secs(1));
-    let since = Instant::now();
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(kill.unwrap().success() && child.try_wait().unwrap().is_none());
-    let o = Outcome::of(child.wait_with_output().unwrap());
-    assert_eq!(o.code, Some(130), "{}", o.stderr);
-    assert!(since.elapsed() < Duration::from_secs(10));
+    let mut track = common::command(&["track", data.to_str().unwrap(), "--front-end", "variance"]);
+    track.args(["--out", out.to_str().unwrap()]);
+    // Signals are listened to right after this file is written.
+    let (o, took) = interrupted(track, &out.join("settings.toml"), Duration::from_secs(1));
+    assert!(took < Duration::from_secs(10), "{took:?}");
     assert!(out.join("tracks.feather").is_file());
     assert_eq!(o.summary(&out.join("summary.json"))["interrupted"], true);
 }
@@ -126,22 +130,10 @@ fn an_interrupt_ends_the_run_in_order() {
     t.drive(1200);
     let out = t.path().join("out");
     let config = t.write("small.toml", SMALL);
-    let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
-        .args(BACKEND)
-        .args(["--out", out.to_str().unwrap(), "--config", config.to_str().unwrap()])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let since = Instant::now();
-    while !out.join("columns/0000000001.feather").exists() {
-        assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
-        thread::sleep(Duration::from_millis(2));
-    }
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(kill.unwrap().success());
-    let o = Outcome::of(child.wait_with_output().unwrap());
-    assert_eq!(o.code, Some(130), "{}", o.stderr);
+    let mut flow = common::command(&["run", t.path().join("drive").to_str().unwrap()]);
+    flow.args(BACKEND);
+    flow.args(["--out", out.to_str().unwrap(), "--config", config.to_str().unwrap()]);
+    let (o, _) = interrupted(flow, &out.join("columns/0000000001.feather"), Duration::ZERO);
     assert!(o.stdout.contains("INTERRUPTED") && o.stdout.contains("digest"), "{}", o.stdout);
     let s = o.summary(&out.join("summary.json"));
     assert_eq!(s["interrupted"], true);

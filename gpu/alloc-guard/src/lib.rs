@@ -33,6 +33,11 @@
 //!
 //! An allocator cannot make the code that called it fail without ending the process. It therefore
 //! notes the first allocation and serves it; the step that ends next returns the note.
+//!
+//! # Memory that is refused
+//!
+//! Code that requests memory cannot handle this either, unless it uses `try_reserve`: [`OnRefusal`]
+//! lets the program say so and end, [`is_granted`] asks beforehand.
 #![deny(missing_docs)]
 
 mod boxed;

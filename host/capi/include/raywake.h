@@ -294,7 +294,7 @@ typedef struct {
 typedef struct {
     // Time of the stamp, s.
     double stamp_s;
-    // Pose of the vehicle at the stamp, not checked as `raywake run` does; null if poses are
+    // Pose of the vehicle at the stamp, used as it is, however much it jitters; null if poses are
     // found.
     const raywake_pose *world_from_vehicle;
     // Its velocity at the stamp; null: that between the previous pose and this one.

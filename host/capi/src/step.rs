@@ -29,7 +29,7 @@ pub struct CTwist {
 pub struct SweepInput {
     /// Time of the stamp, s.
     pub stamp_s: f64,
-    /// Pose of the vehicle at the stamp, not checked as `raywake run` does; null if poses are
+    /// Pose of the vehicle at the stamp, used as it is, however much it jitters; null if poses are
     /// found.
     pub world_from_vehicle: *const CPose,
     /// Its velocity at the stamp; null: that between the previous pose and this one.

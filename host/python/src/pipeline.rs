@@ -110,7 +110,7 @@ impl PyPipeline {
     /// points: N x 3 or more numbers, x, y, z in the vehicle frame, m; (0, 0, 0) and NaN are not
     ///     returns. Or a Sweep of a Recording, which includes everything below.
     /// stamp: time of the sweep, s.
-    /// pose: world_from_vehicle, not checked as `raywake run` does; not with find_poses.
+    /// pose: world_from_vehicle, used as it is, however much it jitters; not with find_poses.
     /// twist: vx, vy, vz, wx, wy, wz of the vehicle along its own axes; default: from the poses.
     /// time: time of every return after the stamp, s.
     /// sensor: index of every return's sensor.

@@ -1,5 +1,4 @@
-//! Locating the vehicle: by received poses, by registration, or by poses where registration does
-//! not show them to be poor.
+//! Locating the vehicle: by registration, or by received poses, checked as those of a recording.
 
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
@@ -40,11 +39,7 @@ impl<'a> LiveLocator<'a> {
         poses: Option<&'a PoseReceiver>,
         trusted: bool,
     ) -> Result<LiveLocator<'a>, RunError> {
-        let locator = match poses {
-            Some(_) if trusted => None,
-            Some(_) => Some(Locator::checking()?),
-            None => Some(Locator::finding()?),
-        };
+        let locator = Locator::of(poses.is_some(), trusted)?;
         Ok(LiveLocator { poses, locator, with_pose: 0, without_pose: 0 })
     }
 

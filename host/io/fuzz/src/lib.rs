@@ -16,7 +16,9 @@ use std::time::Instant;
 use tempfile::TempDir;
 
 pub mod bundle;
+pub mod packet;
 use bundle::Bundle;
+use packet::velodyne;
 
 /// Maximum number of sweeps read from each recording.
 const SWEEPS: usize = 3;
@@ -111,16 +113,6 @@ pub fn packets(bytes: &[u8]) {
     }
     let counts = assembler.counts();
     assert_eq!(counts.packets + counts.foreign + counts.unsound, sent, "{counts:?}");
-}
-
-/// A packet of a Velodyne sensor, the `n`-th of a series: 75 make a revolution.
-fn velodyne(n: u32) -> Vec<u8> {
-    let block = |block: u32| {
-        let azimuth = ((n * 12 + block) * 40 % 36_000) as u16;
-        [&[0xff, 0xee][..], &azimuth.to_le_bytes(), &[0x88, 0x13, 51].repeat(32)].concat()
-    };
-    let blocks: Vec<u8> = (0..12).flat_map(block).collect();
-    [&blocks[..], &n.wrapping_mul(1327).to_le_bytes(), &[0x37, 0x22]].concat()
 }
 
 /// Reads bytes as weights of each kind.

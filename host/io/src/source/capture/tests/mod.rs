@@ -3,8 +3,11 @@
 mod arriving;
 mod disorder;
 mod hdl64;
+#[path = "../../../../fuzz/src/packet.rs"]
+mod packet;
 
 pub(crate) use hdl64::calibrated;
+use packet::velodyne as vlp16;
 
 use std::fs;
 
@@ -105,20 +108,6 @@ fn pcapng(frames: &[Vec<u8>]) -> Vec<u8> {
         file.extend(block(6, body));
     }
     file
-}
-
-/// A packet of a VLP-16 that sees something 10 m away all around; `n` counts packets, 75 per
-/// revolution.
-fn vlp16(n: u32) -> Vec<u8> {
-    let mut packet = Vec::new();
-    for block in 0..BLOCKS as u32 {
-        packet.extend([0xff, 0xee]);
-        packet.extend((((n * 12 + block) * 40 % 36_000) as u16).to_le_bytes());
-        (0..32).for_each(|_| packet.extend([0x88, 0x13, 51]));
-    }
-    packet.extend((n * 1327).to_le_bytes());
-    packet.extend([0x37, 0x22]);
-    packet
 }
 
 const BLOCKS: usize = velodyne::BLOCKS;
