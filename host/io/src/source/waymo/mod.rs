@@ -12,6 +12,7 @@
 //! compensated for the vehicle's motion; those of the other lasers, which reach 20 m, are used as
 //! they are. Images are decoded row by row, so that memory does not grow with the segment.
 
+mod format;
 mod images;
 mod table;
 mod thrift;

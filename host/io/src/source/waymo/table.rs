@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float32Type, Float64Type, Int8Type, Int32Type, Int64Type};
@@ -14,10 +13,8 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
 };
-use parquet::column::page::PageReader;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
-use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::images::Image;
 use super::thrift::{self, PageHeader};
@@ -114,11 +111,9 @@ impl ParquetTable {
         for (n, group) in groups.iter().enumerate() {
             for (leaf, chunk) in group.columns().iter().enumerate() {
                 if schema.get_column_root_idx(leaf) == root {
-                    let rows = group.num_rows().max(0) as usize;
-                    let count = guarded(&self.path, || self.numbers(chunk, rows, most))?;
+                    let numbers = guarded(&self.path, || self.numbers(chunk))?;
                     let wrong = |what| Error::input(&self.path, format!("row group {n}"), what);
-                    let count = count.map_err(|e| wrong(e.to_string()))?;
-                    if count > most {
+                    if numbers.map_err(|e| wrong(e.to_string()))? > most {
                         return Err(wrong(format!("unpacks to more than {most} numbers")));
                     }
                 }
@@ -127,34 +122,19 @@ impl ParquetTable {
         Ok(())
     }
 
-    /// Counts the numbers in the pages of a column, stopping once there are more than `enough`.
-    fn numbers(
-        &self,
-        chunk: &ColumnChunkMetaData,
-        rows: usize,
-        enough: usize,
-    ) -> Result<usize, ParquetError> {
-        self.check_pages(chunk)?;
-        let file = Arc::new(self.file.try_clone()?);
-        let mut pages = SerializedPageReader::new(file, chunk, rows, None)?;
-        let mut count = 0_usize;
-        while let Some(page) = pages.peek_next_page()?.filter(|_| count <= enough) {
-            let levels = if page.is_dict { None } else { page.num_levels.or(page.num_rows) };
-            count = count.saturating_add(levels.unwrap_or(0));
-            pages.skip_next_page()?;
-        }
-        Ok(count)
-    }
-
-    /// Fails if the header of a page is not safe to pass to its decoder.
-    fn check_pages(&self, chunk: &ColumnChunkMetaData) -> Result<(), ParquetError> {
+    /// Counts the numbers in the pages of a column, and those for which a page asks memory if they
+    /// are more. Fails if the header of a page is not safe to pass to its decoder.
+    fn numbers(&self, chunk: &ColumnChunkMetaData) -> Result<usize, ParquetError> {
         let (mut from, length) = chunk.byte_range();
         let end = from.saturating_add(length);
+        let (mut count, mut largest) = (0_usize, 0);
         while from < end {
             let header = self.page_header(from..end)?;
-            from += (header.length + header.compressed) as u64;
+            count = count.saturating_add(header.values);
+            largest = largest.max(header.unpacked / size_of::<f64>());
+            from += (header.length + header.packed) as u64;
         }
-        Ok(())
+        Ok(count.max(largest))
     }
 
     /// The header of the page that begins there.
@@ -209,7 +189,7 @@ fn check_footer(file: &File, length: u64) -> Result<(), ParquetError> {
     let size = u64::from(u32::from_le_bytes([end[0], end[1], end[2], end[3]]));
     // If it is not such a file, the decoder says so.
     let Some(from) = at.checked_sub(size) else { return Ok(()) };
-    if thrift::is_bounded(&read_at(file, from, size)?) { Ok(()) } else { Err(damaged("footer")) }
+    if thrift::is_footer(&read_at(file, from, size)?) { Ok(()) } else { Err(damaged("footer")) }
 }
 
 /// Reads this many bytes of a file, which has them.
@@ -327,9 +307,11 @@ impl TableRow<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::source::tests::Temp;
-    use arrow_array::{FixedSizeListArray, ListArray};
+    use arrow_array::{FixedSizeListArray, ListArray, StringArray};
     use arrow_schema::Field;
     use parquet::arrow::ArrowWriter;
 
@@ -359,7 +341,10 @@ mod tests {
         let values = Arc::new(ListArray::from_iter_primitive::<Float32Type, _, _>(values)) as _;
         let few = [None::<Vec<Option<i32>>>, None, Some(vec![Some(1); 2])];
         let few = Arc::new(FixedSizeListArray::from_iter_primitive::<Int32Type, _, _>(few, 2)) as _;
-        let batch = RecordBatch::try_from_iter([("values", values), ("few", few)]).unwrap();
+        let long =
+            Arc::new(StringArray::from(vec!["x".repeat(800), String::new(), "".into()])) as _;
+        let columns = [("values", values), ("few", few), ("long", long)];
+        let batch = RecordBatch::try_from_iter(columns).unwrap();
         let file = File::create(&path).unwrap();
         let mut writer = ArrowWriter::try_new(file, batch.schema(), None).unwrap();
         writer.write(&batch).unwrap();
@@ -369,6 +354,8 @@ mod tests {
         // The null counts too.
         table.check_size(0, MANY + 4).unwrap();
         table.check_size(1, 6).unwrap();
+        // A page of a few rows that asks for much memory.
+        assert!(table.check_size(2, 110).is_ok() && table.check_size(2, 99).is_err());
         let e = table.check_size(0, MANY + 3).unwrap_err().to_string();
         assert!(e.contains("x.parquet, row group 0: unpacks to more than 1048579 numbers"), "{e}");
         assert_eq!(table.find(&["few", "values"]).unwrap(), [1, 0]);
