@@ -95,7 +95,7 @@ impl<F: FnMut(HeaderNumber, i64)> Elements<'_, F> {
                 delta => id + i64::from(delta),
             };
             // The decoder's numbers of fields have 16 bits.
-            let index = usize::try_from(i16::try_from(id).ok()? - 1).ok()?;
+            let index = usize::try_from(i16::try_from(id).ok()?).ok()?.checked_sub(1)?;
             match (known.get(index).unwrap_or(&FieldType::Any), stated) {
                 // The value of a boolean field is in its type.
                 (FieldType::Any | FieldType::Boolean, 1 | 2) => {}
@@ -187,9 +187,10 @@ mod tests {
         }
         let numbered = |id: [u8; 3]| [&PAGE[..14], &[5], &id, &[0, 0]].concat();
         assert!(page_header(&numbered([0xa8, 0x80, 0])).is_some());
-        // -20, 65,556.
-        assert_eq!(page_header(&numbered([0xa7, 0x80, 0])), None);
-        assert_eq!(page_header(&numbered([0xa8, 0x80, 8])), None);
+        // -20, 65,556, the least of 16 bits.
+        for id in [[0xa7, 0x80, 0], [0xa8, 0x80, 8], [0xff, 0xff, 3]] {
+            assert_eq!(page_header(&numbered(id)), None);
+        }
         // A row group that is a number.
         assert!(is_footer(&[0x49, 0x1c, 0, 0]) && !is_footer(&[0x49, 0x15, 0, 0]));
     }
