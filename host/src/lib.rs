@@ -42,7 +42,7 @@ mod inventory;
 pub mod laps;
 pub mod latency;
 #[cfg(feature = "pcap")]
-mod live;
+pub mod live;
 pub mod locate;
 pub mod map;
 pub mod memory;

@@ -63,7 +63,7 @@ struct Exchange {
 struct Work {
     estimator: FlowEstimator,
     order: StepOrder,
-    /// A step did not finish.
+    /// Something panicked.
     failed: bool,
 }
 
@@ -147,10 +147,7 @@ impl TeamEstimator {
         points: impl ExactSizeIterator<Item = Point>,
     ) -> Result<StepSummary, StepError> {
         let mut work = self.exchange.work();
-        if work.failed {
-            return Err(StepError::Failed);
-        }
-        work.estimator.receive(place, points).map_err(StepError::Sweep)?;
+        work.contain(|estimator| estimator.receive(place, points))?.map_err(StepError::Sweep)?;
         match self.pool {
             None => work.step(place),
             Some(_) => self.exchange.order(work, place),
@@ -160,13 +157,9 @@ impl TeamEstimator {
     /// Reads the results of the last sweep.
     ///
     /// # Errors
-    /// A step failed.
+    /// A step failed, or `read` panics: then all later steps fail.
     pub fn read<R>(&self, read: impl FnOnce(&FlowEstimator) -> R) -> Result<R, StepError> {
-        let work = self.exchange.work();
-        if work.failed {
-            return Err(StepError::Failed);
-        }
-        catch_unwind(AssertUnwindSafe(|| read(&work.estimator))).map_err(|_| StepError::Failed)
+        self.exchange.work().contain(|estimator| read(estimator))
     }
 }
 
@@ -223,11 +216,18 @@ impl Exchange {
 
 impl Work {
     fn step(&mut self, place: &SweepPlace) -> Result<StepSummary, StepError> {
-        let team = ThreadTeam::new(None);
-        let work = AssertUnwindSafe(|| self.estimator.advance(&team, place));
-        let result = catch_unwind(work).map_err(|_| StepError::Failed);
-        self.failed = result.is_err();
-        result
+        self.contain(|estimator| estimator.advance(&ThreadTeam::new(None), place))
+    }
+
+    /// Lets nothing unwind into the caller, who may not be written in Rust. What panicked may have
+    /// left the estimator in any state: it is not used again.
+    fn contain<R>(&mut self, work: impl FnOnce(&mut FlowEstimator) -> R) -> Result<R, StepError> {
+        if !self.failed {
+            let contained = catch_unwind(AssertUnwindSafe(|| work(&mut self.estimator)));
+            self.failed = contained.is_err();
+            return contained.map_err(|_| StepError::Failed);
+        }
+        Err(StepError::Failed)
     }
 }
 

@@ -105,6 +105,26 @@ fn objects_are_followed() {
     assert!(records.iter().all(|o| o.observations >= 3 && o.size_m.iter().all(|m| *m < 30.0)));
 }
 
+/// Whatever panics during a call ends as an error, and so does every later call.
+#[test]
+fn panics_are_contained() {
+    let sweep = &sweeps()[0];
+    let points = || sweep.points.iter().copied();
+    for threads in [1, 2] {
+        let team = || TeamEstimator::new(estimator(&options()), threads).unwrap();
+        let mut receiving = team();
+        let broken = points().map(|p| if p.sensor == 0 { panic!("a defect") } else { p });
+        assert_eq!(receiving.step(&place(sweep), broken), Err(StepError::Failed));
+        let mut reading = team();
+        assert!(reading.step(&place(sweep), points()).is_ok());
+        assert_eq!(reading.read(|_| panic!("a defect")), Err::<(), _>(StepError::Failed));
+        for mut failed in [receiving, reading] {
+            assert_eq!(failed.step(&place(sweep), points()), Err(StepError::Failed));
+            assert_eq!(failed.read(FlowEstimator::tracklet_count), Err(StepError::Failed));
+        }
+    }
+}
+
 #[test]
 fn poses_are_found_and_twists_follow_from_poses() {
     let mut finding = estimator(&EstimatorOptions { registers: true, ..options() });

@@ -16,7 +16,7 @@ mod handover;
 mod locating;
 mod objects;
 mod outlets;
-mod poses;
+pub mod poses;
 mod receiver;
 mod recorder;
 mod stream;

@@ -43,7 +43,8 @@ pub struct PoseCounts {
 type Timed = (u64, Pose);
 
 /// The latest poses, in time order.
-struct RecentPoses {
+#[derive(Default)]
+pub struct RecentPoses {
     poses: heapless::Deque<Timed, KEPT>,
     counts: PoseCounts,
 }
@@ -58,8 +59,7 @@ impl PoseReceiver {
     /// Opens a socket. Fails if the address is unavailable.
     pub fn bind(address: SocketAddr) -> Result<PoseReceiver, Error> {
         let socket = bind(address, "poses-from")?;
-        let track = RecentPoses { poses: heapless::Deque::new(), counts: PoseCounts::default() };
-        Ok(PoseReceiver { socket, track: Mutex::new(track) })
+        Ok(PoseReceiver { socket, track: Mutex::default() })
     }
 
     fn track(&self) -> MutexGuard<'_, RecentPoses> {
@@ -68,7 +68,7 @@ impl PoseReceiver {
 
     /// Counts of datagrams so far.
     pub fn counts(&self) -> PoseCounts {
-        self.track().counts
+        self.track().counts()
     }
 
     /// Receives poses until `stop`.
@@ -78,8 +78,7 @@ impl PoseReceiver {
         });
     }
 
-    /// Returns the vehicle's pose at a time since 1970, ns, and its twist over the duration of a
-    /// sweep from then on. `None` if the poses around that time are missing.
+    /// See [`RecentPoses::at`].
     pub fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
         self.track().at(stamp_ns, sweep_ns)
     }
@@ -97,7 +96,13 @@ fn parse(datagram: &[u8]) -> Option<Timed> {
 }
 
 impl RecentPoses {
-    fn take(&mut self, datagram: &[u8]) {
+    /// Counts of datagrams so far.
+    pub fn counts(&self) -> PoseCounts {
+        self.counts
+    }
+
+    /// Takes the pose in a datagram; counts what is none.
+    pub fn take(&mut self, datagram: &[u8]) {
         let Some(timed) = parse(datagram) else {
             self.counts.foreign += 1;
             return;
@@ -118,7 +123,9 @@ impl RecentPoses {
         let _ = self.poses.push_back(timed);
     }
 
-    fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
+    /// Returns the vehicle's pose at a time since 1970, ns, and its twist over the duration of a
+    /// sweep from then on. `None` if the poses around that time are missing.
+    pub fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
         let pose = self.pose(stamp_ns)?;
         let newest_ns = self.poses.back()?.0;
         // If poses later than the stamp have arrived, the twist is taken from them alone.
@@ -174,13 +181,9 @@ mod tests {
         MAGIC.iter().copied().chain(ns.to_le_bytes()).chain(numbers).collect()
     }
 
-    fn track() -> RecentPoses {
-        RecentPoses { poses: heapless::Deque::new(), counts: PoseCounts::default() }
-    }
-
     /// Forwards at 10 m/s, turning at 0.2 rad/s.
     fn moving(seconds: std::ops::Range<u64>) -> RecentPoses {
-        let mut track = track();
+        let mut track = RecentPoses::default();
         for tenth in seconds.start * 10..seconds.end * 10 {
             let t = tenth as f64 / 10.0;
             let (sin, cos) = (0.1 * t).sin_cos();
@@ -205,7 +208,7 @@ mod tests {
 
     #[test]
     fn invalid_poses_are_counted() {
-        let mut track = track();
+        let mut track = RecentPoses::default();
         assert!(track.at(0, 1).is_none());
         track.take(b"RWP1");
         track.take(&datagram(5, [0.0; 7]));

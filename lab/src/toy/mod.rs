@@ -5,7 +5,7 @@
 //! ones apart (4.2). One linear layer then classifies the digits from those two numbers alone:
 //! table 4.1, figures 4.2 and 4.3.
 
-mod digits;
+pub mod digits;
 #[cfg(test)]
 mod tests;
 mod train;

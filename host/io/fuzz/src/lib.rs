@@ -1,13 +1,20 @@
 #![forbid(unsafe_code)]
-//! What targets do with bytes: read them as a recording, as packets or as weights. Whatever the
-//! bytes are, this ends with an error or a sweep.
+//! What targets do with bytes: read them as a recording, as packets, as poses, as weights or as other
+//! files. Whatever the bytes are, this ends with an error or a result.
 
+use raywake::args::ProfileChoice;
+use raywake::live::poses::RecentPoses;
+use raywake::track::Ground;
+use raywake::{budget, config};
 use raywake_core::encoder::EncoderWeights;
 use raywake_core::stages::{background_filter, occupancy_constancy};
 use raywake_io::source::capture::assembly::Assembler;
 use raywake_io::source::capture::live::{LiveSensor, SensorModel};
 use raywake_io::source::decoder::damaged;
+use raywake_io::source::simulated::Simulated;
 use raywake_io::source::{OpenOptions, SweepData, Unlocated, open};
+use raywake_lab::labels;
+use raywake_lab::toy::digits;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -22,6 +29,8 @@ use packet::velodyne;
 
 /// Maximum number of sweeps read from each recording.
 const SWEEPS: usize = 3;
+/// Number of sweeps of the drive that labels belong to.
+const SWEEPS_LABELLED: usize = 20;
 /// Number of levels that weights are read for.
 const LEVELS: usize = 10;
 
@@ -46,6 +55,55 @@ pub fn recording(bytes: &[u8]) {
     let Some(Bundle { root, topics, files }) = Bundle::parse(bytes) else { return };
     if replace(files).is_ok() {
         read(&FOLDER.path().join(root), topics);
+    }
+}
+
+/// Reads a [`Bundle`] as what the name of its root says: settings (`.toml`), a map of the ground
+/// (`.asc`), digits (`digits`) or, with another name, labels of a drive of [`SWEEPS_LABELLED`] sweeps.
+pub fn files(bytes: &[u8]) {
+    let Some(Bundle { root, files, .. }) = Bundle::parse(bytes) else { return };
+    if replace(files).is_err() {
+        return;
+    }
+    let path = FOLDER.path().join(&root);
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("toml") => settings(&path),
+        Some("asc") => drop(Ground::read(&path)),
+        _ if root.starts_with("digits") => drop(digits::open(&path, 1)),
+        _ => label(&path),
+    }
+}
+
+fn settings(path: &Path) {
+    let choice = ProfileChoice { config: Some(path.to_path_buf()), ..ProfileChoice::default() };
+    let Ok(settings) = config::settings(&choice) else { return };
+    // What was accepted can be planned for.
+    let _ = budget::host_bytes(&settings.profile, true) + budget::device_bytes(&settings.profile);
+}
+
+fn label(path: &Path) {
+    let drive = Simulated::new(1, SWEEPS_LABELLED);
+    let Ok(Some(found)) = labels::find(path, &drive) else { return };
+    for trajectory in labels::trajectories(&found, &drive) {
+        for state in trajectory.states() {
+            assert!(state.velocity.is_finite(), "{state:?}");
+        }
+    }
+}
+
+/// Takes poses: every 72 bytes are a datagram. Whatever they are, the pose at any time is finite.
+pub fn poses(bytes: &[u8]) {
+    let mut poses = RecentPoses::default();
+    for datagram in bytes.chunks(72) {
+        poses.take(datagram);
+        let stamp =
+            datagram.get(8..16).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes);
+        for (at, sweep) in [(stamp, 100_000_000), (stamp.saturating_add(50_000_000), 1)] {
+            if let Some((pose, twist)) = poses.at(at, sweep) {
+                let numbers = [pose.translation, twist.linear, twist.angular];
+                assert!(numbers.iter().all(|v| v.is_finite()), "{pose:?} {twist:?}");
+            }
+        }
     }
 }
 
