@@ -276,6 +276,28 @@ fn outputs_do_not_replace_inputs() {
     run(&t, &["--summary", folder.to_str().unwrap()]).failed(4, &["folder: is a directory"]);
 }
 
+/// Results of another process are neither mixed with ours nor replaced.
+#[test]
+fn one_process_writes_at_a_time() {
+    let t = Temp::new();
+    t.drive(3);
+    let (out, film) = (t.path().join("out"), t.path().join("a.mcap"));
+    std::fs::create_dir(&out).unwrap();
+    let partial = t.write(".a.mcap.partial", "theirs");
+    let options = [["--out", out.to_str().unwrap()], ["--mcap", film.to_str().unwrap()]];
+    let held = [&out, &partial].map(|path| std::fs::File::open(path).unwrap());
+    for (option, lock) in options.iter().zip(&held) {
+        lock.try_lock().unwrap();
+        run(&t, option).failed(4, &[option[1], "another process is writing"]);
+        lock.unlock().unwrap();
+    }
+    assert!(std::fs::read_dir(&out).unwrap().next().is_none() && !film.exists());
+    assert_eq!(std::fs::read(&partial).unwrap(), b"theirs");
+    // What a process left behind that was killed is in nobody's way.
+    run(&t, options.as_flattened()).succeeded();
+    assert!(out.join("columns").is_dir() && film.is_file() && !partial.exists());
+}
+
 #[test]
 fn budgets() {
     let all = raywake(&["budget"]);

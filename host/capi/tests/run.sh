@@ -37,6 +37,10 @@ compare "C, one thread, shared library" "$out/replay-shared" "$out/demo.sweeps" 
 small_stack() { (ulimit -s 512 && "$@"); }
 compare "C, one thread, 512 KiB of stack" small_stack "$out/replay" "$out/demo.sweeps" 1
 
+# The tests of the module for Python compare these with its records.
+gcc "${flags[@]}" host/capi/tests/records.c -o "$out/records" "${static[@]}"
+"$out/records" "$out/demo.sweeps" "$out/demo.records"
+
 # Another architecture, under its emulator.
 target=aarch64-unknown-linux-gnu
 if [ "$(uname -m)" = x86_64 ] && command -v aarch64-linux-gnu-gcc >/dev/null &&

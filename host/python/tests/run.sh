@@ -44,7 +44,11 @@ dump() { cargo run --quiet --release -p raywake-capi --example dump_sweeps -- "$
 dump demo "$out/demo.sweeps" 20
 # Results of another build would count as results of other settings.
 rm -rf "$out/demo"
-RAYWAKE_SWEEPS=$out/demo.sweeps \
+# Reads the program's tables.
+"$out/fresh/bin/pip" install --quiet --disable-pip-version-check pyarrow==26.0.1 ||
+    echo "skipped: records against tables, as pyarrow cannot be installed"
+RAYWAKE_PROGRAM=$program RAYWAKE_SWEEPS=$out/demo.sweeps \
+    RAYWAKE_RECORDS=$PWD/target/capi/demo.records \
     RAYWAKE_DIGEST=$("$program" demo --backend scalar --out "$out/demo" | sed -n 's/^digest *//p') \
     "$python" host/python/tests/test_raywake.py
 

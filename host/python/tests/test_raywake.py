@@ -1,6 +1,7 @@
 """Tests the wheel against the program, and with invalid input.
 
-Run with RAYWAKE_SWEEPS=FILE, from dump_sweeps, and RAYWAKE_DIGEST=what the program prints for it.
+Run with RAYWAKE_SWEEPS=FILE, from dump_sweeps, RAYWAKE_DIGEST=what the program prints for it,
+RAYWAKE_RECORDS=FILE, from records.c, and RAYWAKE_PROGRAM=the program.
 """
 
 import ast
@@ -18,6 +19,11 @@ from pathlib import Path
 
 import numpy as np
 import raywake
+
+try:
+    from pyarrow import feather
+except ImportError:
+    feather = None
 
 
 class Flat:
@@ -53,6 +59,48 @@ class Flat:
 
 
 SWEEPS = Flat(os.environ["RAYWAKE_SWEEPS"])
+
+# Fields of records and the columns of the program's tables that have the same numbers.
+MOTION = {
+    "velocity_world_mps": ["vx_world_mps", "vy_world_mps"],
+    "velocity_covariance": ["cov_xx", "cov_xy", "cov_yy"],
+    "probability": ["p_moves"],
+    "age": ["age"],
+}
+PLACE = {
+    "cell": ["cell_i", "cell_j"],
+    "position_world_m": ["x_world_m", "y_world_m"],
+    "position_vehicle_m": ["x_m", "y_m"],
+    "velocity_ego_mps": ["vx_ego_mps", "vy_ego_mps"],
+}
+STATE = ["x", "y", "heading", "speed", "turn"]
+TABLES = {
+    "columns": PLACE | MOTION | {
+        "displacement_m": ["dx_world_m", "dy_world_m"],
+        "displacement_covariance": ["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"],
+        "basis": ["foreground", "valid"],
+        "class_id": ["class"],
+    },
+    "points": MOTION | {
+        "velocity_ego_mps": ["vx_ego_mps", "vy_ego_mps", "vz_ego_mps"],
+        "status": ["status"],
+        "basis": ["foreground", "valid"],
+        "class_id": ["class"],
+    },
+    "tracklets": PLACE | {
+        "velocity_world_mps": MOTION["velocity_world_mps"],
+        "probability": ["p_moves"],
+        "age": ["age"],
+        "heading_rad": ["heading_world_rad"],
+        "speed_mps": ["speed_mps"],
+        "turn_rate_radps": ["turn_rate_radps"],
+        "covariance": [
+            f"cov_{a}_{b}"
+            for n, a in enumerate(STATE)
+            for b in STATE[n:]
+        ],
+    },
+}
 
 
 def drive(points=lambda xyz: xyz, most=None, **options):
@@ -113,6 +161,47 @@ class Same(unittest.TestCase):
         view = columns["velocity_world_mps"]
         self.assertTrue(view.shape == (len(columns), 2) and np.shares_memory(view, columns))
         self.assertTrue(0 <= columns["probability"].min() <= columns["probability"].max() <= 1)
+
+    def test_records_of_c(self):
+        _, step = drive(objects=True)
+        with open(os.environ["RAYWAKE_RECORDS"], "rb") as records:
+            for ours in (step.columns, step.points, step.tracklets, step.objects):
+                (count,) = struct.unpack("<Q", records.read(8))
+                theirs = np.frombuffer(records.read(count * ours.itemsize), ours.dtype)
+                self.assertGreater(count, 0)
+                for name in ours.dtype.names:
+                    self.assertEqual(ours[name].tobytes(), theirs[name].tobytes(), name)
+            self.assertEqual(records.read(), b"")
+
+    @unittest.skipIf(feather is None, "pyarrow is missing")
+    def test_tables_of_the_program(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for n, (_, _, _, returns) in enumerate(list(SWEEPS)[:8]):
+                rows = np.hstack([returns["xyz"], np.zeros((len(returns), 1), "f4")])
+                Path(folder, f"{n:06}.bin").write_bytes(rows.tobytes())
+            out = Path(folder, "out")
+            asked = ["--ground", "-1.7", "--poses", "register", "--backend", "scalar", "--quiet"]
+            program = os.environ["RAYWAKE_PROGRAM"]
+            subprocess.run([program, "run", folder, "--out", out, *asked], check=True)
+            recording = raywake.Recording(folder, ground=-1.7)
+            pipeline = raywake.Pipeline(rig=recording.rig, find_poses=True)
+            steps = [pipeline.step(sweep) for sweep in recording]
+            # Flow is that of the sweep before the last.
+            for kind, frame in {"columns": 6, "points": 6, "tracklets": 7}.items():
+                table = feather.read_table(out / kind / f"{frame:010}.feather", memory_map=False)
+                self.same(getattr(steps[-1], kind), table, TABLES[kind])
+
+    def same(self, records, table, fields):
+        self.assertEqual(set(fields), set(records.dtype.names))
+        self.assertEqual((len(records) > 0, len(records)), (True, table.num_rows))
+        for name, columns in fields.items():
+            theirs = np.stack([table[column].to_numpy() for column in columns], -1)
+            ours = records[name].reshape(len(records), -1)
+            if name == "covariance":
+                ours = ours.reshape(-1, 5, 5)[:, *np.triu_indices(5)]
+            if name == "basis":
+                ours = np.hstack([ours > 0, ours > 1])
+            np.testing.assert_array_equal(ours, theirs, name)
 
     def test_objects(self):
         found = {}

@@ -82,9 +82,11 @@ fn settings(path: &Path) {
 }
 
 fn label(path: &Path) {
-    let drive = Simulated::new(1, SWEEPS_LABELLED);
-    let Ok(Some(found)) = labels::find(path, &drive) else { return };
-    for trajectory in labels::trajectories(&found, &drive) {
+    static DRIVE: LazyLock<Mutex<Simulated>> =
+        LazyLock::new(|| Mutex::new(Simulated::new(1, SWEEPS_LABELLED)));
+    let drive = DRIVE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Ok(Some(found)) = labels::find(path, &*drive) else { return };
+    for trajectory in labels::trajectories(&found, &*drive) {
         for state in trajectory.states() {
             assert!(state.velocity.is_finite(), "{state:?}");
         }
