@@ -2,6 +2,7 @@
 
 use super::{Kind, Labels, Track, View, kind::kind};
 use glam::DQuat;
+use raywake_core::plausible::{FRAME_MAX_M, WORLD_MAX_M, is_within};
 use raywake_core::pose::Pose;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -104,6 +105,9 @@ fn usable(row: &LabelRow) -> Result<Pose, &'static str> {
     if !whole(&row.centre) || !whole(&row.size) || !row.rotation.is_finite() {
         return Err("boxes left out: a NaN or infinite number");
     }
+    if !is_within(row.centre.into(), WORLD_MAX_M) || !is_within(row.size.into(), FRAME_MAX_M) {
+        return Err("boxes left out: farther away or larger than possible");
+    }
     if row.size.iter().any(|&s| s <= 0.0) {
         return Err("boxes left out: length, width or height not positive");
     }
@@ -141,6 +145,8 @@ mod tests {
         let mut g = Gather::default();
         g.add(&LabelRow { centre: [f64::NAN, 0.0, 0.0], ..row("a", 1) });
         g.add(&LabelRow { rotation: heading(f64::INFINITY), ..row("a", 1) });
+        g.add(&LabelRow { centre: [1.0, -1e300, 0.0], ..row("a", 1) });
+        g.add(&LabelRow { size: [4.0, 1e300, 1.0], ..row("a", 1) });
         g.add(&LabelRow { size: [4.0, 0.0, 1.0], ..row("a", 1) });
         g.add(&LabelRow { rotation: heading(0.0) * 2.0, ..row("a", 1) });
         g.add(&LabelRow { class: "Zeppelin", ..row("z", 1) });
@@ -153,6 +159,7 @@ mod tests {
         let expected = [
             "1 boxes left out: length, width or height not positive",
             "2 boxes left out: a NaN or infinite number",
+            "2 boxes left out: farther away or larger than possible",
             "1 boxes left out: the quaternion is not of length 1",
             "1 boxes left out: the track already has one in that frame",
             "1 boxes whose class differs from that of their track's first box",

@@ -122,8 +122,8 @@ impl ParquetTable {
         Ok(())
     }
 
-    /// Counts the numbers in the pages of a column, and those for which a page asks memory if they
-    /// are more. Fails if the header of a page is not safe to pass to its decoder.
+    /// Counts the numbers in the pages of a column, dictionaries included, and those for which a
+    /// page asks memory if they are more. Fails if the header of a page is not safe to pass to its decoder.
     fn numbers(&self, chunk: &ColumnChunkMetaData) -> Result<usize, ParquetError> {
         let (mut from, length) = chunk.byte_range();
         let end = from.saturating_add(length);
@@ -351,13 +351,13 @@ mod tests {
         writer.close().unwrap();
         assert!(path.metadata().unwrap().len() < 10_000);
         let table = ParquetTable::open(&path).unwrap();
-        // The null counts too.
-        table.check_size(0, MANY + 4).unwrap();
-        table.check_size(1, 6).unwrap();
+        // The null counts too, and so do the dictionaries, of two numbers and of one.
+        table.check_size(0, MANY + 6).unwrap();
+        table.check_size(1, 5).unwrap();
         // A page of a few rows that asks for much memory.
         assert!(table.check_size(2, 110).is_ok() && table.check_size(2, 99).is_err());
-        let e = table.check_size(0, MANY + 3).unwrap_err().to_string();
-        assert!(e.contains("x.parquet, row group 0: unpacks to more than 1048579 numbers"), "{e}");
+        let e = table.check_size(0, MANY + 5).unwrap_err().to_string();
+        assert!(e.contains("x.parquet, row group 0: unpacks to more than 1048581 numbers"), "{e}");
         assert_eq!(table.find(&["few", "values"]).unwrap(), [1, 0]);
     }
 }

@@ -14,11 +14,11 @@ const DEPTH_MAX: usize = 32;
 pub(super) struct PageHeader {
     /// Its length in bytes.
     pub length: usize,
-    /// HeaderNumber of bytes that follow.
+    /// Number of bytes that follow.
     pub packed: usize,
-    /// HeaderNumber of bytes to which these unpack.
+    /// Number of bytes to which these unpack.
     pub unpacked: usize,
-    /// HeaderNumber of values, missing ones included; 0 for a dictionary.
+    /// Number of values, missing ones included, or of a dictionary's entries.
     pub values: usize,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn page_header(bytes: &[u8]) -> Option<PageHeader> {
     let number = |number: HeaderNumber| numbers[number as usize];
     let values = match number(HeaderNumber::PageType)? {
         0 => number(HeaderNumber::Values)?,
-        2 => number(HeaderNumber::Entries).map(|_| 0)?,
+        2 => number(HeaderNumber::Entries)?,
         3 => number(HeaderNumber::ValuesV2)?,
         _ => return None,
     };
@@ -171,10 +171,10 @@ mod tests {
         // Negative lengths and numbers of values.
         assert!([(4, 9), (7, 5), (10, 16)].iter().all(|(at, byte)| with(*at, *byte).is_some()));
         assert!([(3, 0x81), (6, 0xd9), (10, 13)].iter().all(|(at, b)| with(*at, *b).is_none()));
-        // A dictionary in place of data: three fields on.
+        // A dictionary in place of data: two fields on.
         let mut page = PAGE;
         (page[1], page[8]) = (4, 0x4c);
-        assert_eq!(page_header(&page).unwrap().values, 0);
+        assert_eq!(page_header(&page).unwrap().values, 7);
     }
 
     /// Every known field as another type, and a field whose number the decoder takes for another.
