@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Many recordings on many machines: the same bytes as from one process, whatever distributes the
 # shards, even if a task is killed and requeued. `shards.sh PROGRAM LAB`; steps that need GNU
-# parallel or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root) are skipped with a
-# message if these are missing.
+# parallel, DuckDB or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root) are skipped
+# with a message if these are missing.
 set -euo pipefail
 program=$(realpath "$1")
 lab=$(realpath "$2")
@@ -36,7 +36,8 @@ expected=$(bytes_of "$work/one")
 
 # Killed at arbitrary points, and started again.
 for delay in 0.2 0.5 0.9; do
-    { timeout -s KILL "$delay" "$work/task" "$work/killed" "--shard=0/2" || true; } 2>/dev/null
+    # `timeout` would kill itself too, before the task is gone, unless it is in the foreground.
+    timeout --foreground -s KILL "$delay" "$work/task" "$work/killed" "--shard=0/2" || true
 done
 "$work/task" "$work/killed" "--shard=0/2"
 "$work/task" "$work/killed" "--shard=1/2"
@@ -55,6 +56,26 @@ if command -v parallel >/dev/null; then
     compare parallel
 else
     echo "skipped: GNU parallel cannot be installed"
+fi
+
+# The queries of the documents, on these results. With the environment of the module for Python.
+python=target/python/fresh/bin
+queries_of() { awk '/^```sql$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$1"; }
+if [ -x $python/pip ] &&
+    $python/pip install --quiet --disable-pip-version-check duckdb==2.0.1 2>/dev/null; then
+    "$lab" eval --list "$work/list" --out "$work/OUT" --rows-only >"$work/log" 2>&1 ||
+        { cat "$work/log"; exit 1; }
+    ln -s one "$work/results"
+    for document in examples/cluster/README.md lab/README.md; do
+        queries_of $document >"$work/queries"
+        (cd "$work" && "$OLDPWD/$python/python" -c 'import duckdb
+for query in open("queries").read().split(";")[:-1]:
+    rows = duckdb.sql(query).fetchall()
+    assert rows and None not in rows[0], query
+    print("DuckDB:", *rows[0])')
+    done
+else
+    echo "skipped: DuckDB cannot be installed"
 fi
 
 slurm() {
