@@ -1,6 +1,6 @@
 #![forbid(unsafe_code)]
-//! What targets do with bytes: read them as a recording, as packets, as poses, as weights or as other
-//! files. Whatever the bytes are, this ends with an error or a result.
+//! What targets do with bytes: read them as a recording, packets, poses, weights or other files.
+//! Whatever the bytes are, this ends with an error or a result.
 
 use raywake::args::ProfileChoice;
 use raywake::live::poses::RecentPoses;
@@ -59,7 +59,8 @@ pub fn recording(bytes: &[u8]) {
 }
 
 /// Reads a [`Bundle`] as what the name of its root says: settings (`.toml`), a map of the ground
-/// (`.asc`), digits (`digits`) or, with another name, labels of a drive of [`SWEEPS_LABELLED`] sweeps.
+/// (`.asc`), digits (`digits`) or, with another name, labels of a drive of [`SWEEPS_LABELLED`]
+/// sweeps.
 pub fn files(bytes: &[u8]) {
     let Some(Bundle { root, files, .. }) = Bundle::parse(bytes) else { return };
     if replace(files).is_err() {

@@ -123,7 +123,8 @@ impl ParquetTable {
     }
 
     /// Counts the numbers in the pages of a column, dictionaries included, and those for which a
-    /// page asks memory if they are more. Fails if the header of a page is not safe to pass to its decoder.
+    /// page asks memory if they are more. Fails if the header of a page is not safe to pass to its
+    /// decoder.
     fn numbers(&self, chunk: &ColumnChunkMetaData) -> Result<usize, ParquetError> {
         let (mut from, length) = chunk.byte_range();
         let end = from.saturating_add(length);
