@@ -63,7 +63,7 @@ struct Eval {
 enum Other {
     /// Trajectory and shape of objects against their truth (chapter 2).
     Tracks(Box<tracks::Args>),
-    /// Learned features as printed in chapter 4: table 4.2, figures 4.5 and 4.8.
+    /// Learned features as printed in chapter 4: table 4.2, figures 4.5 to 4.8.
     Flsf(flsf::evaluate::Args),
     /// A cleaned recording against its truth: static kept, dynamic removed.
     Clean(eval::clean::Args),

@@ -1,4 +1,4 @@
-//! `raywake-lab eval flsf`: table 4.2, figures 4.5 and 4.8, comparing occupancy constancy and
+//! `raywake-lab eval flsf`: table 4.2, figures 4.5 to 4.8, comparing occupancy constancy and
 //! learned features by one protocol on the same drives.
 
 use super::conclude::conclude;

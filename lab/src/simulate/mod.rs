@@ -55,8 +55,8 @@ pub struct Args {
     #[arg(long, default_value = "hdl64")]
     #[arg(value_parser = PossibleValuesParser::new(SensorRig::NAMES))]
     sensor: String,
-    /// Scene that is driven through: a street; or `outskirts`, which nothing is trained or tuned
-    /// on: one of the places listed after it, drawn for every drive.
+    /// Scene that is driven through: a street; or `outskirts`, which nothing is trained on:
+    /// one of the places listed after it, drawn for every drive.
     #[arg(long, default_value = "street", value_parser = sceneries())]
     scenery: Scenery,
     /// What the vehicle does in a street; elsewhere the place determines it.

@@ -1,5 +1,5 @@
-//! A second kind of scenery, for testing only, never for training or tuning: nothing that is placed
-//! or drawn here comes from the builders of the first kind ([`crate::street`], [`crate::traffic`]).
+//! A second kind of scenery, for testing only, never for training: nothing that is placed or drawn
+//! here comes from the builders of the first kind ([`crate::street`], [`crate::traffic`]).
 //!
 //! Solids, models of vehicles and people, paths, relief and casting are shared with the rest of the
 //! simulator.
