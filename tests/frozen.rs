@@ -13,10 +13,11 @@ use raywake::track::{Ended, Tracker};
 use raywake_alloc_guard::{Allocation, Guard, Sealed};
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
-use raywake_core::stages::background_filter;
+use raywake_core::stages::{FLOW_PROGRAMS, background_filter};
 use raywake_core::team::Team as _;
 use raywake_gpu::{Census, Options};
 use raywake_io::source::SweepData;
+use raywake_kernels::schedule::Schedule;
 use raywake_objects::params::TrackingParams;
 use raywake_tests::drives::{Setup, pairs, street, sweep};
 
@@ -24,7 +25,7 @@ use raywake_tests::drives::{Setup, pairs, street, sweep};
 static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
 
 /// Maximum memory on a device for a window of 50 m.
-const DEVICE_BYTES: u64 = 64 << 20;
+const DEVICE_BYTES: u64 = 40 << 20;
 
 /// Numbers of threads, independent of the machine.
 const THREADS: [usize; 2] = [3, 1];
@@ -146,5 +147,11 @@ fn check_census(census: &Census) -> u64 {
     let bytes = census.upload_bytes + census.device_bytes + census.readback_bytes;
     assert!(census.memory_allocations <= 3, "{census:?}");
     assert!(bytes <= DEVICE_BYTES, "{census:?}");
+    // As many as `raywake budget` states, whatever the device.
+    let schedule = Schedule::new(FLOW_PROGRAMS, &Profile::hdl64());
+    for programs in [schedule.programs, schedule.on_cpus] {
+        let barriers = programs.iter().map(|p| p.commands(schedule.rows.len()).barriers as u64);
+        assert_eq!(barriers.sum::<u64>(), census.barriers, "{census:?}");
+    }
     bytes
 }

@@ -45,7 +45,7 @@ mod timer;
 pub use device::{DeviceInfo, DeviceKind, Limits, devices};
 pub use error::{FailurePoint, GpuError};
 pub use executor::Executor;
-pub use order::{Access, accesses};
+pub use order::{Access, CommandCounts, accesses};
 pub use owner::Census;
 
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Which steps have to be ordered: the conflict rule, independent of Vulkan.
 
-use crate::{Groups, Op};
+use crate::{Groups, Op, Program};
 
 /// What one step does to one buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +74,35 @@ impl Hazards {
 pub(crate) fn barriers(steps: &[Vec<Access>], buffers: usize) -> Vec<bool> {
     let mut hazards = Hazards { read: vec![false; buffers], written: vec![false; buffers] };
     steps.iter().map(|step| hazards.admit(step)).collect()
+}
+
+/// Number of commands of a program.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CommandCounts {
+    /// Dispatches of kernels.
+    pub dispatches: usize,
+    /// Fills of buffers.
+    pub fills: usize,
+    /// Copies between buffers.
+    pub copies: usize,
+    /// Barriers between these.
+    pub barriers: usize,
+}
+
+impl Program {
+    /// Counts the commands that it is recorded as, over a table of this many buffers.
+    pub fn commands(&self, buffers: usize) -> CommandCounts {
+        let steps: Vec<_> = self.ops.iter().map(accesses).collect();
+        let barriers = barriers(&steps, buffers).into_iter().filter(|&b| b).count();
+        self.ops.iter().fold(CommandCounts { barriers, ..Default::default() }, |mut counts, op| {
+            *match op {
+                Op::Dispatch { .. } => &mut counts.dispatches,
+                Op::Fill { .. } => &mut counts.fills,
+                Op::Copy { .. } => &mut counts.copies,
+            } += 1;
+            counts
+        })
+    }
 }
 
 #[cfg(test)]

@@ -251,7 +251,9 @@ mod tests {
     fn sums() {
         let p = Profile::hdl64();
         let (device, scalar) = (device_bytes(&p), host_bytes(&p, true) - host_bytes(&p, false));
-        assert!((1 << 20..64 << 20).contains(&device), "{device}");
+        // With room for 262,144 returns.
+        assert!((1 << 20..=40 << 20).contains(&device), "{device}");
+        assert!(host_bytes(&p, true) <= 88 << 20, "{}", host_bytes(&p, true));
         assert!(scalar < device && scalar > heap_bytes(Heap::Upload, &p), "{scalar}");
         let text = memory_layout(&shipped());
         assert!(text.contains("| hdl64 | wide |"), "{text}");

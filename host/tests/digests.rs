@@ -20,7 +20,7 @@ const WIDTHS: [u32; 3] = [128, 256, 512];
 const THREADS: [u32; 3] = [0, 1, 2];
 const THREADS_AT: u32 = 256;
 /// Maximum device memory of a run of the default profile, bytes.
-const DEVICE_BYTES: u64 = 64 << 20;
+const DEVICE_BYTES: u64 = 40 << 20;
 
 /// A left turn on the simulated street, in KITTI's layout.
 fn drive(t: &Temp) -> PathBuf {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use raywake_core::params::{Profile, REACH};
 use raywake_core::record::{PACKED, SweepUniform};
 use raywake_core::stages::BufferRow;
-use raywake_gpu::{Buffer, Heap};
+use raywake_gpu::{Buffer, CommandCounts, Heap, Op, Program};
 use raywake_kernels::schedule::Schedule;
 
 use super::traffic::{self, Traffic};
@@ -45,6 +45,11 @@ The voxels of a sweep, and the file made from them, grow with what is seen and a
 const CAPACITY: &str = "
 A sweep of more returns than the capacity is read whole; the pipeline counts the returns that it
 leaves out.
+";
+
+const COMMANDS_HEAD: &str = "\
+`load` runs once, before the first sweep, the others once for every sweep or band of keys. What
+kernels read and write depends on the sweep.
 ";
 
 const TRACKS_HEAD: &str = "
@@ -136,7 +141,8 @@ impl Layout<'_> {
     fn write(&self, out: &mut String) -> std::fmt::Result {
         HEAPS.iter().try_for_each(|heap| heap_table(out, *heap, self))?;
         host_table(out, self)?;
-        totals(out, self)
+        totals(out, self)?;
+        commands(out, self)
     }
 }
 
@@ -220,6 +226,34 @@ fn totals(out: &mut String, layout: &Layout) -> std::fmt::Result {
     row("vulkan | host", &|p| host_bytes(p, false))?;
     row("vulkan | both", &|p| device_bytes(p) + host_bytes(p, false))?;
     row("scalar | host", &|p| host_bytes(p, true))
+}
+
+/// What a sweep has the device do.
+fn commands(out: &mut String, layout: &Layout) -> std::fmt::Result {
+    let (level, sizes, schedule) = (layout.level, &layout.sizes[..], &layout.schedule);
+    writeln!(out, "\n{level} Commands\n\n{COMMANDS_HEAD}")?;
+    let names = cells(sizes, |s| format!("{}: bytes filled or copied", s.names));
+    writeln!(out, "| program | dispatches | fills | copies | barriers | {names} |")?;
+    let rule = cells(sizes, |_| "--:".into()).replace(' ', "");
+    writeln!(out, "|---|--:|--:|--:|--:|{rule}|")?;
+    for program in &schedule.programs {
+        let CommandCounts { dispatches, fills, copies, barriers } =
+            program.commands(schedule.rows.len());
+        let moved = cells(sizes, |s| grouped(moved(program, schedule, s.profile)));
+        let counts = format!("{dispatches} | {fills} | {copies} | {barriers}");
+        writeln!(out, "| {} | {counts} | {moved} |", program.name)?;
+    }
+    Ok(())
+}
+
+/// Bytes that the fills and copies of a program write.
+fn moved(program: &Program, schedule: &Schedule, profile: &Profile) -> u64 {
+    let bytes = |buffer: usize| schedule.rows[buffer].buffer.row().bytes(profile) as u64;
+    let written = program.ops.iter().map(|op| match op {
+        Op::Fill { buffer, .. } | Op::Copy { to: buffer, .. } => bytes(*buffer),
+        Op::Dispatch { .. } => 0,
+    });
+    written.sum()
 }
 
 /// Writes the words of records, and how elements are packed.
