@@ -139,7 +139,7 @@ pub struct OdometryArgs {
     pub part: Selection,
 }
 
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct Recording {
     #[command(flatten)]
@@ -158,7 +158,7 @@ pub struct Recording {
 }
 
 /// The kind of recording and how to read it.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct RecordingKind {
     /// Recording format [default: detected]

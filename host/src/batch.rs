@@ -1,8 +1,8 @@
 //! Many recordings, one after another, each with its own results: `--list`.
 //!
 //! Results of a recording are stored at its path below the output folder. A file [`DONE`] next to
-//! them records what they were made with: settings, weights and algorithms, and names and sizes of
-//! the recording's files. Later runs, on any machine, leave finished results as they are. A
+//! them records what they were made with: settings, weights and algorithms, the contents of files
+//! that options name, and names and sizes of the recording's files. Later runs, on any machine, leave finished results as they are. A
 //! recording that was interrupted is resumed, as without a list; if two processes work on the same
 //! one, the later reports an error.
 
@@ -14,17 +14,15 @@ use std::path::{Component, Path, PathBuf};
 use raywake_core::digest::Digest;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use raywake_io::source::whole::read_text;
+use raywake_io::source::whole::{self, read_text};
 
-use crate::args::{BackendChoice, FlowChoice, Recordings, Shard, inputs};
+use crate::args::{BackendChoice, FlowChoice, Recording, Recordings, Shard, inputs};
 use crate::config;
 use crate::console::{interrupted, say, warn};
 use crate::error::RunError;
 use crate::inventory::inventory;
+use crate::settings_file::DONE;
 use crate::weight_files::WeightFiles;
-
-/// Name of the file next to complete results.
-const DONE: &str = "done";
 
 /// The digest that `raywake demo` prints. It changes whenever results do, so that earlier results
 /// no longer count as done.
@@ -34,6 +32,8 @@ pub const DEMO_DIGEST: u64 = 0x96b4_c758_df59_d3f6;
 pub struct SharedArgs<'a> {
     /// Which recordings.
     pub recordings: &'a mut Recordings,
+    /// How they are read.
+    pub recording: &'a Recording,
     /// Profile, weights and backend the flow is computed with.
     pub flow: &'a mut FlowChoice,
     /// Whether only errors are printed.
@@ -44,8 +44,8 @@ pub struct SharedArgs<'a> {
 macro_rules! shared_args {
     () => {
         fn shared(&mut self) -> crate::batch::SharedArgs<'_> {
-            let Self { recordings, flow, quiet, .. } = self;
-            crate::batch::SharedArgs { recordings, flow, quiet }
+            let Self { recordings, recording, flow, quiet, .. } = self;
+            crate::batch::SharedArgs { recordings, recording, flow, quiet }
         }
     };
 }
@@ -67,6 +67,11 @@ pub trait RecordingCommand: Clone + Debug {
 
     /// The option given, if any, that names a single file, which several recordings cannot share.
     fn single_file(&self) -> Option<&'static str>;
+
+    /// A file that the command reads besides recording, poses, settings and weights.
+    fn other_input(&self) -> Option<&Path> {
+        None
+    }
 
     /// Runs the command on one recording. Returns whether it ran to completion.
     fn execute(&self) -> Result<bool, RunError>;
@@ -204,15 +209,23 @@ fn finish(
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
     plain.set_output(PathBuf::new());
-    let SharedArgs { recordings, flow, quiet } = plain.shared();
+    let SharedArgs { recordings, recording, flow, quiet } = plain.shared();
+    let files = [recording.poses.as_deref(), recording.kind.extrinsics.as_deref()];
+    let files = files.into_iter().chain([command.other_input()]).flatten().map(content);
+    let files: Vec<_> = files.collect::<Result<_, _>>()?;
     // Results are the same on each backend.
     (*recordings, flow.backend, *quiet) = (Recordings::default(), BackendChoice::default(), true);
     let settings = config::settings(&flow.profile)?;
     let weights = WeightFiles::read(&flow.learned, &settings.profile)?.digest();
     let made_with = (&settings.profile, &settings.objects);
-    let all = format!("{plain:?} {made_with:?} {weights} {DEMO_DIGEST:016x}");
+    let all = format!("{plain:?} {files:x?} {made_with:?} {weights} {DEMO_DIGEST:016x}");
     let (digest, version) = (Digest::of(all.as_bytes()), env!("CARGO_PKG_VERSION"));
     Ok(format!("raywake {version} {} {digest:016x}", C::NAME))
+}
+
+/// Digest of a file's content. `None` if it is no file: `register` instead of poses.
+fn content(path: &Path) -> Result<Option<u64>, Error> {
+    path.is_file().then(|| whole::read(path).map(|bytes| Digest::of(&bytes))).transpose()
 }
 
 /// Recordings of a list: one path per line; empty lines and those that begin with `#` are skipped.
@@ -311,6 +324,7 @@ mod tests {
     #[derive(Clone, Debug)]
     struct Noted {
         recordings: Recordings,
+        recording: Recording,
         flow: FlowChoice,
         out: Option<PathBuf>,
         quiet: bool,
@@ -359,6 +373,7 @@ mod tests {
         fs::write(&list, text.join("\n")).unwrap();
         let mut command = Noted {
             recordings: Recordings { list: Some(list), ..Recordings::default() },
+            recording: Recording::default(),
             flow: FlowChoice::default(),
             out: Some(folder.path().join("out")),
             quiet: true,
@@ -382,9 +397,19 @@ mod tests {
         command.flow.backend.simd = Some(raywake_simd::Simd::BASELINE);
         assert!(each(&command).is_err());
         assert_eq!(names.clone().map(|name| times(&name)), [2, 2, 3, 2, 2]);
-        // So is a recording that has changed.
+        // So is a recording that has changed,
         fs::write(names[0].join("more"), "x").unwrap();
         assert!(each(&command).is_err());
-        assert_eq!(names.map(|name| times(&name)), [3, 2, 4, 2, 2]);
+        assert_eq!(names.clone().map(|name| times(&name)), [3, 2, 4, 2, 2]);
+        // and a file that an option names.
+        let poses = folder.path().join("poses.txt");
+        command.recording.poses = Some(poses.clone());
+        for (content, expected) in
+            [("1", [4, 3, 5, 3, 3]), ("1", [4, 3, 6, 3, 3]), ("2", [5, 4, 7, 4, 4])]
+        {
+            fs::write(&poses, content).unwrap();
+            assert!(each(&command).is_err());
+            assert_eq!(names.clone().map(|name| times(&name)), expected);
+        }
     }
 }

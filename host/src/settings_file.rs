@@ -5,9 +5,11 @@
 //! accepts only results that would write an identical one.
 
 use std::fmt::Write;
-use std::io::Write as _;
+use std::fs;
+use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 
+use raywake_core::digest::Digest;
 use raywake_core::params::{Parameters, Profile, Value};
 use raywake_io::Error;
 use raywake_io::sink::atomic::{self, FolderClaim};
@@ -17,6 +19,8 @@ use raywake_objects::params::TrackingParams;
 
 /// Name of the file.
 pub const NAME: &str = "settings.toml";
+/// Name of the file next to complete results, see [`crate::batch`].
+pub const DONE: &str = "done";
 /// Maximum number of differences listed in an error.
 const DIFFERENCES_LISTED_MAX: usize = 3;
 
@@ -38,23 +42,32 @@ pub struct ResultSettings<'a> {
 
 impl ResultSettings<'_> {
     /// Writes the file into the output folder, if there is one, and keeps other processes from
-    /// writing there while the returned value lives.
+    /// writing there while the returned value lives. From then on, what is there is not complete.
     ///
     /// # Errors
-    /// If the folder has results of another recording or other settings, if another process is
-    /// writing to it, or if the file cannot be written.
+    /// If the folder has something that is no result, or results of another recording or other
+    /// settings, if another process is writing to it, or if the file cannot be written.
     pub fn claim(&self, root: Option<&Path>) -> Result<Option<FolderClaim>, Error> {
         let Some(root) = root else { return Ok(None) };
         let claim = atomic::claim_folder(root)?;
         let (path, text) = (root.join(NAME), self.text());
-        if !path.is_file() {
-            atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
-            return Ok(Some(claim));
+        match path.is_file() {
+            true => match read_text(&path)? {
+                there if there == text => begin_again(root)?,
+                there => return Err(different(root, &there, &text)),
+            },
+            false => {
+                unused(root)?;
+                atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
+            }
         }
-        match read_text(&path)? {
-            there if there == text => Ok(Some(claim)),
-            there => Err(different(root, &there, &text)),
-        }
+        Ok(Some(claim))
+    }
+
+    /// Identifies the sensors, stamps and poses of the recording.
+    fn digest(&self) -> u64 {
+        let Overview { rig, frames, track, trusted, .. } = self.recording;
+        Digest::of(format!("{rig:?} {frames:?} {track:?} {trusted}").as_bytes())
     }
 
     fn text(&self) -> String {
@@ -64,12 +77,14 @@ impl ResultSettings<'_> {
         let own = rig.own_vehicle.map_or("none".into(), |own| format!("{own:?} m"));
         let mut text = format!(
             "# raywake {} {command}, model weights {weights}\n\
-             # {name}: {} sweeps from frame {}, from the sweep with index {first} on\n\
+             # {name:?}: {} sweeps from frame {}, from the sweep with index {first} on\n\
+             # sensors, stamps and poses {:016x}\n\
              # poses: {poses}; ground at {:?} m; deskew {}; box of the own vehicle: {own}\n\
              base = \"hdl64\"\nname = \"{}\"\n",
             env!("CARGO_PKG_VERSION"),
             frames.len(),
             frames[0],
+            self.digest(),
             rig.ground_m,
             rig.distorted,
             profile.name,
@@ -84,6 +99,25 @@ impl ResultSettings<'_> {
             });
         }
         text
+    }
+}
+
+/// Fails if a folder has anything, other than hidden files: results would be mixed with it, or
+/// replace it.
+fn unused(root: &Path) -> Result<(), Error> {
+    let entries = root.read_dir().map_err(Error::reading(root))?;
+    let mut names = entries.filter_map(|entry| Some(entry.ok()?.file_name().display().to_string()));
+    names.find(|name| !name.starts_with('.')).map_or(Ok(()), |name| {
+        let what = format!("has `{name}`, but no results: choose a folder that is new or empty");
+        Err(Error::Usage(format!("{} {what}", root.display())))
+    })
+}
+
+/// Results that are continued are no longer complete.
+fn begin_again(root: &Path) -> Result<(), Error> {
+    match fs::remove_file(root.join(DONE)) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::writing(&root.join(DONE))(e)),
+        _ => Ok(()),
     }
 }
 

@@ -276,6 +276,40 @@ fn outputs_do_not_replace_inputs() {
     run(&t, &["--summary", folder.to_str().unwrap()]).failed(4, &["folder: is a directory"]);
 }
 
+/// What a folder has is neither replaced by results nor mixed with them, and earlier results are
+/// only kept if they are still right.
+#[test]
+fn what_is_there_stays() {
+    let t = Temp::new();
+    t.drive(4);
+    let theirs = t.write("out/columns/0000000000.feather", "theirs");
+    let out = t.path().join("out");
+    let to = |out: &std::path::Path| ["--out".to_string(), out.display().to_string()];
+    let to_out = to(&out);
+    let options = to_out.each_ref().map(String::as_str);
+    run(&t, &options).failed(2, &["out has `columns`, but no results"]);
+    assert_eq!(std::fs::read(&theirs).unwrap(), b"theirs");
+    // A recording inside the output folder.
+    let inside = to(t.path());
+    run(&t, &inside.each_ref().map(String::as_str)).failed(2, &["but no results"]);
+    std::fs::remove_dir_all(&out).unwrap();
+    run(&t, &options).succeeded();
+    run(&t, &options).succeeded();
+    // One sweep has lost half of its returns since; then poses differ.
+    let sweep = t.path().join("drive/velodyne_points/data/0000000002.bin");
+    let whole = std::fs::read(&sweep).unwrap();
+    std::fs::write(&sweep, &whole[..whole.len() / 32 * 16]).unwrap();
+    run(&t, &options).failed(2, &["feather differs from this run's result"]);
+    std::fs::write(&sweep, &whole).unwrap();
+    run(&t, &options).succeeded();
+    let trusting = [&options[..], &["--trust-poses"]].concat();
+    run(&t, &trusting).failed(2, &["holds other results", "sensors, stamps and poses"]);
+    t.write("drive/poses.txt", (0..4).map(|n| common::row(f64::from(n) * 0.6)).collect::<String>());
+    run(&t, &options).failed(2, &["holds other results", "sensors, stamps and poses"]);
+    let page = t.path().join("a").display().to_string();
+    run(&t, &["--film", &page, "--page", &page]).failed(2, &["--film and --page are both"]);
+}
+
 /// Results of another process are neither mixed with ours nor replaced.
 #[test]
 fn one_process_writes_at_a_time() {

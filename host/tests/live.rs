@@ -242,10 +242,12 @@ fn a_full_disk() {
         mcap.display()
     );
     let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
-    o.failed(4, &["street.mcap", "recording stopped"]);
+    o.failed(4, &["street.mcap", "too large", "recording stopped", "street.incomplete.mcap"]);
     let s = o.summary(&t.path().join("s.json"));
     assert_accounted(&s);
     assert!(s["recording_failure"].as_str().is_some() && !mcap.exists());
+    let kept = fs::metadata(t.path().join("street.incomplete.mcap")).unwrap();
+    assert!(kept.len() > 100_000, "{kept:?}");
     assert!(!fs::read_dir(t.path()).unwrap().any(|e| is_partial(&e.unwrap().path())));
 }
 

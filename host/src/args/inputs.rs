@@ -21,10 +21,19 @@ pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
     let given =
         command.into_iter().flat_map(paths).flat_map(|id| given(id).map(move |at| (id, at)));
     let (outputs, inputs): (Vec<_>, Vec<_>) = given.partition(|(id, _)| OUTPUTS.contains(id));
-    for (id, output) in outputs {
+    for (n, (id, output)) in outputs.iter().enumerate() {
         inputs.iter().try_for_each(|(_, input)| spare(id, output, input))?;
+        outputs[..n].iter().try_for_each(|other| apart(other, (id, output)))?;
     }
     Ok(())
+}
+
+/// Fails if two outputs are the same.
+fn apart((first, place): &(&str, &Path), (second, other): (&str, &Path)) -> Result<(), Error> {
+    match resolved(place) == resolved(other) {
+        true => Err(Error::Usage(format!("--{first} and --{second} are both {}", other.display()))),
+        false => Ok(()),
+    }
 }
 
 /// Fails if the output of an option is the input, or would replace a file of it.

@@ -46,7 +46,8 @@ const MOVING_MIN: f32 = 0.4;
 /// completion.
 fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let mut source = source::open(args.recordings.path(), &args.recording.options())?;
-    let profile = config::profile(&args.flow.profile)?;
+    let mut profile = config::profile(&args.flow.profile)?;
+    profile.deskew |= args.recording.kind.deskew == Some(true);
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let sweeps = args.part.range(source.len())?;
     let made = ResultSettings {
@@ -76,7 +77,7 @@ fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         && cleaning.write(source, sweeps, kept)?;
     if done {
         let points = cleaning.map.points();
-        clouds::write_ply(&args.out.join("map.ply"), ["x", "y", "z", "intensity"], &points)?;
+        clouds::write_map(&args.out.join("map.ply"), &points)?;
         say(args.quiet, &cleaning.text(points.len()))?;
     }
     Ok(done)

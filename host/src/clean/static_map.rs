@@ -20,7 +20,7 @@ struct VoxelReturns {
 /// The static map, growing with the drive.
 pub struct StaticMap {
     voxel_m: f64,
-    voxels: HashMap<[i32; 3], VoxelReturns>,
+    voxels: HashMap<[i64; 3], VoxelReturns>,
 }
 
 impl StaticMap {
@@ -31,7 +31,7 @@ impl StaticMap {
     /// Adds a return at a world position.
     pub fn add(&mut self, at: DVec3, intensity: f32, judged: ReturnVerdict) {
         let index = (at / self.voxel_m).floor();
-        let key = index.to_array().map(|c| c as i32);
+        let key = index.to_array().map(|c| c as i64);
         match judged {
             ReturnVerdict::Moving => self.voxels.entry(key).or_default().moving += 1,
             ReturnVerdict::Static => {
@@ -44,16 +44,15 @@ impl StaticMap {
         }
     }
 
-    /// The points: x, y, z (m, world) and intensity, in voxel order.
-    pub fn points(&self) -> Vec<[f32; 4]> {
+    /// The points: x, y, z (m, world), and intensity, in voxel order.
+    pub fn points(&self) -> Vec<([f64; 3], f32)> {
         let still = self.voxels.iter().filter(|(_, seen)| seen.still > seen.moving);
         let mut still: Vec<_> = still.collect();
         still.sort_unstable_by_key(|(key, _)| **key);
-        let point = |(key, seen): (&[i32; 3], &VoxelReturns)| {
+        let point = |(key, seen): (&[i64; 3], &VoxelReturns)| {
             let [x, y, z, intensity] = seen.sum.map(|sum| f64::from(sum) / f64::from(seen.still));
-            let corner = DVec3::from_array(key.map(f64::from)) * self.voxel_m;
-            let [x, y, z] = (corner + DVec3::new(x, y, z)).as_vec3().to_array();
-            [x, y, z, intensity as f32]
+            let corner = DVec3::from_array(key.map(|c| c as f64)) * self.voxel_m;
+            ((corner + DVec3::new(x, y, z)).to_array(), intensity as f32)
         };
         still.into_iter().map(point).collect()
     }
@@ -76,8 +75,17 @@ mod tests {
         ] {
             map.add(DVec3::new(x, 1.25, 0.0), 0.5, judged);
         }
-        let points = map.points();
-        assert_eq!(points.len(), 1, "{points:?}");
-        assert!((points[0][0] + 0.2).abs() < 1e-6 && points[0][1..] == [1.25, 0.0, 0.5]);
+        let [([x, y, z], intensity)] = map.points()[..] else { panic!("{:?}", map.points()) };
+        assert!((x + 0.2).abs() < 1e-6 && [y, z] == [1.25, 0.0] && intensity == 0.5);
+    }
+
+    /// Where neighbouring float32 are half a metre apart.
+    #[test]
+    fn positions_far_from_the_origin() {
+        let mut map = StaticMap::new(0.02);
+        let at = DVec3::new(458_000.123, 5_428_000.456, -9e7);
+        map.add(at, 0.0, ReturnVerdict::Static);
+        let [(point, _)] = map.points()[..] else { panic!("{:?}", map.points()) };
+        assert!(DVec3::from_array(point).distance(at) < 1e-3, "{point:?}");
     }
 }

@@ -118,8 +118,8 @@ pub fn record(
                 let Some(open) = &mut sink else { continue };
                 match spare.write(open) {
                     Some(Err(e)) => {
-                        sink = None;
                         fail(&mut recorded, e);
+                        sink.take().into_iter().for_each(keep);
                     }
                     _ => recorded.pairs += 1,
                 }
@@ -132,6 +132,15 @@ pub fn record(
         fail(&mut recorded, e);
     }
     recorded
+}
+
+/// A sensor's data cannot be had again: what was recorded is kept.
+fn keep(sink: BagSink) {
+    match sink.keep_incomplete() {
+        Some(Ok(path)) => warn(&format!("what was recorded before is in {}", path.display())),
+        Some(Err(e)) => warn(&e.to_string()),
+        None => {}
+    }
 }
 
 fn fail(recorded: &mut RecordingOutcome, error: Error) {

@@ -138,6 +138,10 @@ impl RecordingCommand for args::TrackArgs {
         streams.or(self.summary.is_some().then_some("summary"))
     }
 
+    fn other_input(&self) -> Option<&Path> {
+        self.ground_map.as_deref()
+    }
+
     fn execute(&self) -> Result<bool, RunError> {
         track(self)
     }

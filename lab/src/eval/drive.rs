@@ -76,7 +76,8 @@ impl Settings {
     fn key(&self, source: &dyn Source, labels: &Labels) -> serde_json::Value {
         let moments =
             (0..source.len()).map(|i| (source.frame(i), source.stamp_s(i), source.pose(i)));
-        let drive = format!("{:?}{:?}{labels:?}", source.rig(), moments.collect::<Vec<_>>());
+        let (rig, trusted) = (source.rig(), source.overview().trusted);
+        let drive = format!("{rig:?}{trusted}{:?}{labels:?}", moments.collect::<Vec<_>>());
         json!({
             "rows": ROWS,
             "algorithms": format!("{DEMO_DIGEST:016x}"),

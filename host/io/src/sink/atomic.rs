@@ -66,6 +66,19 @@ impl Partial {
     }
 }
 
+impl Partial {
+    /// Keeps what has been written, next to the path: `a.incomplete.mcap` for `a.mcap`. Returns
+    /// where it is.
+    pub fn keep_incomplete(mut self) -> Result<PathBuf, Error> {
+        let extension = self.path.extension().map(|e| e.display().to_string());
+        let extension = extension.map_or("incomplete".into(), |e| format!("incomplete.{e}"));
+        let path = self.path.with_extension(extension);
+        fs::rename(&self.partial, &path).map_err(Error::writing(&path))?;
+        self.kept = true;
+        Ok(path)
+    }
+}
+
 impl Drop for Partial {
     fn drop(&mut self) {
         // Once renamed, the file is done, and another process may be using the temporary name. If

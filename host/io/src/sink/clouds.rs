@@ -75,6 +75,20 @@ pub fn write_ply<const N: usize>(
     })
 }
 
+/// Writes a map of points in the world, where `float` would have steps of decimetres: `x`, `y`, `z`
+/// (m) as `double`, and `intensity`.
+pub fn write_map(path: &Path, points: &[([f64; 3], f32)]) -> Result<(), Error> {
+    atomic::write(path, |out| {
+        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", points.len())?;
+        ["x", "y", "z"].iter().try_for_each(|name| writeln!(out, "property double {name}"))?;
+        write!(out, "property float intensity\nend_header\n")?;
+        points.iter().try_for_each(|(at, intensity)| {
+            at.iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))?;
+            out.write_all(&intensity.to_le_bytes())
+        })
+    })
+}
+
 /// Writes one label per return as SemanticKITTI does: little-endian, 32 bits.
 pub fn write_labels(path: &Path, labels: &[u32]) -> Result<(), Error> {
     atomic::write(path, |out| labels.iter().try_for_each(|l| out.write_all(&l.to_le_bytes())))

@@ -37,11 +37,10 @@ pub enum FlowTables {
     Files(Box<[ParquetFile; KINDS.len()]>),
 }
 
-/// Tables of single sweeps. Existing ones are kept, as left by an interrupted run.
+/// Tables of single sweeps. Existing ones, as left by an interrupted run, must be identical to
+/// those that would be written.
 pub struct Folders {
     root: PathBuf,
-    /// Whether an existing table of a kind was found identical to the one that would be written.
-    checked: [bool; KINDS.len()],
 }
 
 impl FlowTables {
@@ -49,8 +48,7 @@ impl FlowTables {
     pub fn folders(root: &Path, with_points: bool) -> Result<FlowTables, Error> {
         let kinds = KINDS.iter().enumerate().filter(|(n, _)| with_points || *n != POINTS);
         kinds.map(|(_, name)| root.join(name)).try_for_each(|f| atomic::create_folder(&f))?;
-        let checked = [false; KINDS.len()];
-        Ok(FlowTables::Folders(Folders { root: root.to_path_buf(), checked }))
+        Ok(FlowTables::Folders(Folders { root: root.to_path_buf() }))
     }
 
     /// One file of each kind, [`KINDS`] with `.parquet`. Rows begin with `frame` uint64, `stamp_s`
@@ -125,24 +123,19 @@ impl Folders {
     ) -> Result<(), Error> {
         // Ten digits, so that names sort in frame order.
         let path = self.root.join(format!("{}/{:010}.feather", KINDS[kind], of.frame));
-        let is_there = path.is_file();
-        if is_there && self.checked[kind] {
-            return Ok(());
-        }
         let mark = [
             ("frame", of.frame.to_string()),
             ("stamp_s", of.stamp_s.to_string()),
             ("dt_s", of.dt_s.to_string()),
         ];
         let bytes = table.file(&path, &[&mark, meta].concat())?;
-        if !is_there {
+        if !path.is_file() {
             return atomic::write(&path, |out| std::io::Write::write_all(out, &bytes));
         }
         if whole::read(&path)? != bytes {
             let what = "differs from this run's result: choose another folder, or delete it";
             return Err(Error::Usage(format!("{} {what}", path.display())));
         }
-        self.checked[kind] = true;
         Ok(())
     }
 }

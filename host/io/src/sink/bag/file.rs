@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions, Writer};
+use mcap::{Compression, McapError, WriteOptions, Writer};
 
 use super::Topic;
 use crate::Error;
@@ -39,7 +39,7 @@ impl MessageFile {
             let channels = topics.iter().map(&mut channel).collect::<Result<_, _>>()?;
             Ok((writer, channels))
         };
-        let (writer, channels) = begin().map_err(|e| partial.error(e))?;
+        let (writer, channels) = begin().map_err(|e| because(&partial, e))?;
         Ok(MessageFile { writer, partial, channels, sequence: 0 })
     }
 
@@ -53,12 +53,27 @@ impl MessageFile {
         };
         self.sequence = self.sequence.wrapping_add(1);
         let written = self.writer.write_to_known_channel(&header, message);
-        written.map_err(|e| self.partial.error(e))
+        written.map_err(|e| because(&self.partial, e))
     }
 
     /// Completes the file.
     pub fn finish(mut self) -> Result<(), Error> {
-        self.writer.finish().map_err(|e| self.partial.error(e))?;
+        self.writer.finish().map_err(|e| because(&self.partial, e))?;
         self.partial.keep()
+    }
+
+    /// Keeps what has been written, without an index. Returns where it is.
+    pub fn keep_incomplete(self) -> Result<PathBuf, Error> {
+        // This tries to complete the file.
+        drop(self.writer);
+        self.partial.keep_incomplete()
+    }
+}
+
+/// An error in writing a file, with the system's reason if it has one.
+fn because(partial: &Partial, e: McapError) -> Error {
+    match e {
+        McapError::Io(e) => partial.error(e),
+        e => partial.error(e),
     }
 }

@@ -37,6 +37,8 @@ mod scene;
 mod schemas;
 mod tracked;
 
+use std::path::PathBuf;
+
 use raywake_core::output::{ColumnFlow, PairFlows};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
@@ -183,6 +185,15 @@ impl BagSink {
     pub fn finish(self) -> Result<(), Error> {
         self.live.into_iter().for_each(LiveServer::finish);
         self.file.map_or(Ok(()), MessageFile::finish)
+    }
+}
+
+impl BagSink {
+    /// Keeps what has been written to the file so far, without an index, under another name, which
+    /// is returned if there is a file.
+    pub fn keep_incomplete(self) -> Option<Result<PathBuf, Error>> {
+        self.live.into_iter().for_each(LiveServer::finish);
+        self.file.map(MessageFile::keep_incomplete)
     }
 }
 
