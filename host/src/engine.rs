@@ -82,6 +82,7 @@ pub fn execute<S: Source + ?Sized>(
         profile,
         objects: None,
         weights: &plan.weights.digest(),
+        others: "no pair depends on what comes after it",
     };
     // After all checks, and before anything there is replaced.
     let _claim = made.claim(root)?;

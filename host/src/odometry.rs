@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use raywake_io::sink::atomic;
+use raywake_io::sink::atomic::Partial;
 use raywake_io::source::{self, Unlocated, pose_row};
 
 use crate::args;
@@ -18,13 +18,15 @@ pub fn odometry(args: &args::OdometryArgs) -> Result<bool, RunError> {
     let sweeps = args.part.range(source.len())?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes())?;
+    // Whether it can be written is better known before than after.
+    let (file, mut to) = Partial::create(&args.out)?;
     let mut poses = Vec::with_capacity(sweeps.len());
     let end = for_each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         poses.push(visit.now.world_from_vehicle);
         Ok(())
     })?;
-    atomic::write(&args.out, |to| {
-        poses.iter().try_for_each(|pose| writeln!(to, "{}", pose_row(pose)))
-    })?;
+    let written = poses.iter().try_for_each(|pose| writeln!(to, "{}", pose_row(pose)));
+    written.and_then(|()| to.flush()).map_err(|e| file.error(e))?;
+    file.keep()?;
     Ok(!end.interrupted)
 }

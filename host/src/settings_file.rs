@@ -38,6 +38,8 @@ pub struct ResultSettings<'a> {
     pub objects: Option<&'a TrackingParams>,
     /// Digest of the model weights, or a placeholder.
     pub weights: &'a str,
+    /// Whatever else the results depend on, in one line.
+    pub others: &'a str,
 }
 
 impl ResultSettings<'_> {
@@ -71,23 +73,23 @@ impl ResultSettings<'_> {
     }
 
     fn text(&self) -> String {
-        let ResultSettings { command, recording, first, profile, objects, weights } = self;
+        let ResultSettings { command, recording, first, profile, objects, weights, others } = self;
         let Overview { name, rig, frames, .. } = recording;
         let poses = if recording.track.poses.is_empty() { "none" } else { "of the recording" };
         let own = rig.own_vehicle.map_or("none".into(), |own| format!("{own:?} m"));
         let mut text = format!(
             "# raywake {} {command}, model weights {weights}\n\
              # {name:?}: {} sweeps from frame {}, from the sweep with index {first} on\n\
-             # sensors, stamps and poses {:016x}\n\
+             # sensors, stamps and poses {:016x}; {others}\n\
              # poses: {poses}; ground at {:?} m; deskew {}; box of the own vehicle: {own}\n\
-             base = \"hdl64\"\nname = \"{}\"\n",
+             base = \"hdl64\"\nname = {:?}\n",
             env!("CARGO_PKG_VERSION"),
             frames.len(),
             frames[0],
             self.digest(),
             rig.ground_m,
             rig.distorted,
-            profile.name,
+            profile.name.as_str(),
         );
         for (group, parameters) in profile.groups() {
             add(&mut text, group, parameters);
@@ -194,6 +196,7 @@ mod tests {
                 profile,
                 objects,
                 weights,
+                others: "nothing else",
             };
             made.claim(Some(&root)).unwrap();
             let choice = ProfileChoice { config: Some(root.join(NAME)), ..Default::default() };
@@ -214,6 +217,7 @@ mod tests {
                 profile,
                 objects: None,
                 weights,
+                others: "nothing else",
             };
             made.claim(Some(folder.path())).map(|_| ()).map_err(|e| e.to_string())
         };

@@ -57,6 +57,7 @@ fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         profile: &profile,
         objects: None,
         weights: &weights.digest(),
+        others: &format!("sweeps {sweeps:?}, voxels of {} m", args.voxel),
     };
     let _claim = made.claim(Some(&args.out))?;
     atomic::create_folder(&args.out.join("labels"))?;

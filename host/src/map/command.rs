@@ -41,6 +41,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
         profile: &profile,
         objects: None,
         weights: "none",
+        others: &format!("sweeps {sweeps:?}, clipped at {}", args.clip),
     };
     let _claim = made.claim(Some(&args.out))?;
     say(args.quiet, &format!("{}\n", source.describe()))?;

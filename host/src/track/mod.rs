@@ -5,6 +5,7 @@ mod report;
 mod tracker;
 mod write;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -20,6 +21,7 @@ use crate::progress::Progress;
 use crate::session::for_each_sweep;
 use crate::settings_file::ResultSettings;
 use crate::weight_files::WeightFiles;
+use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_io::source;
@@ -50,6 +52,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         profile: &settings.profile,
         objects: Some(&settings.objects),
         weights: &WeightFiles::read(&args.flow.learned, &settings.profile)?.digest(),
+        others: &others(args, &sweeps, ground.as_ref()),
     };
     let _claim = made.claim(args.out.as_deref())?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
@@ -118,6 +121,16 @@ fn budget(fixed_lag: bool) -> String {
         );
     }
     text
+}
+
+/// What tracks depend on besides recording, parameters and weights.
+fn others(args: &args::TrackArgs, sweeps: &Range<usize>, ground: Option<&Ground>) -> String {
+    let args::TrackArgs { front_end, estimate, fixed_lag, all, .. } = args;
+    let ground = Digest::of(format!("{ground:?}").as_bytes());
+    format!(
+        "sweeps {sweeps:?}, front end {front_end:?}, estimate {estimate:?}, \
+         fixed lag {fixed_lag}, all {all}, ground {ground:016x}"
+    )
 }
 
 impl RecordingCommand for args::TrackArgs {

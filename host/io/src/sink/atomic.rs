@@ -39,6 +39,11 @@ const ATTEMPTS: usize = 8;
 impl Partial {
     /// Creates the temporary file of `path`. Fails if another process is writing it.
     pub fn create(path: &Path) -> Result<(Partial, BufWriter<File>), Error> {
+        // A device or pipe would be replaced by a file.
+        if path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+            let what = io::Error::new(ErrorKind::InvalidInput, "not a regular file");
+            return Err(Error::writing(path)(what));
+        }
         let partial = partial_path(path)?;
         let file = create_locked(&partial).map_err(Error::writing(path))?;
         let again = file.try_clone().map_err(Error::writing(path))?;
