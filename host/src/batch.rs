@@ -233,7 +233,8 @@ fn listed(list: &Path) -> Result<Vec<ListedRecording>, Error> {
     let text = read_text(list)?;
     let mut places = BTreeMap::new();
     let mut found = Vec::new();
-    for (n, line) in (1..).zip(text.lines()) {
+    // Some editors begin a file with a byte order mark.
+    for (n, line) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;

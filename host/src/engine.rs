@@ -86,8 +86,8 @@ pub fn execute<S: Source + ?Sized>(
     };
     // After all checks, and before anything there is replaced.
     let _claim = made.claim(root)?;
-    let figures = FiguresFile::create(plan.summary.as_deref(), root)?;
     let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
+    let figures = FiguresFile::create(plan.summary.as_deref(), root)?;
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
     say(&budget::paragraph(profile, &chosen.drive, &chosen.filter))?;

@@ -20,7 +20,7 @@ fn list_of(lines: &[&str]) -> Result<Vec<PathBuf>, String> {
 
 #[test]
 fn lists() {
-    let found = list_of(&["# both", "ROOT/a", "", "  ROOT/./c/\r"]).unwrap();
+    let found = list_of(&["\u{feff}# both", "ROOT/a", "", "  ROOT/./c/\r"]).unwrap();
     assert_eq!(found, [PathBuf::from("a"), PathBuf::from("c")]);
     assert_eq!(list_of(&["# none"]), Ok(Vec::new()));
     for (lines, words) in [
