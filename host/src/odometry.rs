@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use raywake_io::sink::atomic::Partial;
-use raywake_io::source::{self, Unlocated, pose_row};
+use raywake_io::source::{self, Unlocated, pose_rows};
 
 use crate::args;
 use crate::console::{note, say};
@@ -20,12 +20,12 @@ pub fn odometry(args: &args::OdometryArgs) -> Result<bool, RunError> {
     note(args.quiet, source.notes())?;
     // Whether it can be written is better known before than after.
     let (file, mut to) = Partial::create(&args.out)?;
-    let mut poses = Vec::with_capacity(sweeps.len());
+    let (first, mut poses) = (sweeps.start, Vec::with_capacity(sweeps.len()));
     let end = for_each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         poses.push(visit.now.world_from_vehicle);
         Ok(())
     })?;
-    let written = poses.iter().try_for_each(|pose| writeln!(to, "{}", pose_row(pose)));
+    let written = to.write_all(pose_rows(first, &poses).as_bytes());
     written.and_then(|()| to.flush()).map_err(|e| file.error(e))?;
     file.keep()?;
     Ok(!end.interrupted)

@@ -57,6 +57,21 @@ fn poses_are_found_and_useful() {
 }
 
 /// Poses that alternate by 3 cm are replaced; those that slip are not.
+/// They belong to the sweeps they were found for.
+#[test]
+fn poses_of_a_part() {
+    let t = Temp::new();
+    recording(&t, SWEEPS);
+    let [clouds, poses, out] =
+        ["clouds", "poses.txt", "out"].map(|n| t.path().join(n).display().to_string());
+    raywake(&["odometry", &clouds, "--out", &poses, "--sweeps", "2..5"]).succeeded();
+    raywake(&["run", &clouds, "--poses", &poses, "--backend", "scalar", "--out", &out]).succeeded();
+    let tables = std::fs::read_dir(t.path().join("out/columns")).unwrap();
+    let mut names: Vec<_> = tables.map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["0000000002.feather", "0000000003.feather"]);
+}
+
 #[test]
 fn given_poses() {
     let t = Temp::new();

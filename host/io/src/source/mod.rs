@@ -74,7 +74,7 @@ use clap::ValueEnum;
 pub use clouds::read_cloud;
 use options::apply;
 pub use options::{OpenOptions, PosesFrame, Unlocated};
-pub use pose_files::read_pose;
+pub use pose_files::{pose_rows, read_pose};
 pub use poses::{PoseTrack, pose_row, rigid};
 pub use recognise::recognise;
 

@@ -12,7 +12,7 @@ use raywake_core::plausible::is_time;
 use raywake_core::pose::Pose;
 
 use super::plausible::reach;
-use super::poses::{pose_from, rigid};
+use super::poses::{pose_from, pose_row, rigid};
 use super::trajectory::Trajectory;
 use super::{npy, text, whole};
 use crate::Error;
@@ -20,6 +20,10 @@ use crate::Error;
 /// A stamp at most this far before the first or after the last pose takes that pose, ns: text
 /// rounds times.
 const SLACK_NS: i64 = 1_000_000;
+
+/// Before the index of the sweep that the first row without a time belongs to, if that is not the
+/// recording's first: a comment for other programs.
+const FIRST: &str = "# first sweep: ";
 
 /// A row of a file.
 struct PoseRow {
@@ -31,25 +35,33 @@ struct PoseRow {
 
 /// The pose of a file at each of some stamps, ns; `None` where it has none.
 ///
-/// Rows without times belong to the first sweeps, and so do rows with times of another clock if
+/// Rows without times belong to the first sweeps, or those from the index after [`FIRST`] on; so do rows with times of another clock if
 /// there is one for each sweep. Fails if a row is not a pose, if one is out of reach of any drive,
 /// if there are more rows without times than sweeps, and if no sweep has a pose.
 pub(super) fn read(path: &Path, stamps_ns: &[i64]) -> Result<Vec<Option<Pose>>, Error> {
-    let (rows, sweeps) = (rows(path)?, stamps_ns.len());
+    let ((first, rows), sweeps) = (rows(path)?, stamps_ns.len());
     let timed = rows.first().is_some_and(|row| row.time_s.is_some());
     let by_time = if timed { at(&rows, stamps_ns) } else { Vec::new() };
     if by_time.iter().any(Option::is_some) {
         return Ok(by_time);
     }
-    let fits = if timed { rows.len() == sweeps } else { (1..=sweeps).contains(&rows.len()) };
+    let expected = sweeps.saturating_sub(first);
+    let fits = if timed { rows.len() == sweeps } else { (1..=expected).contains(&rows.len()) };
     if !fits {
         let times = if timed { " at other times than the sweeps" } else { "" };
-        let what = format!("{} poses{times}, expected {sweeps}", rows.len());
+        let what = format!("{} poses{times}, expected {expected}", rows.len());
         return Err(Error::input(path, "", what));
     }
-    let mut poses: Vec<Option<Pose>> = rows.iter().map(|row| Some(row.pose)).collect();
+    let mut poses = vec![None; if timed { 0 } else { first }];
+    poses.extend(rows.iter().map(|row| Some(row.pose)));
     poses.resize(sweeps, None);
     Ok(poses)
+}
+
+/// The text of a file of the poses of a recording's sweeps from the index `first` on.
+pub fn pose_rows(first: usize, poses: &[Pose]) -> String {
+    let head = if first > 0 { format!("{FIRST}{first}\n") } else { String::new() };
+    poses.iter().fold(head, |text, pose| text + &pose_row(pose) + "\n")
 }
 
 /// The pose in a file of one row.
@@ -85,9 +97,9 @@ fn at(rows: &[PoseRow], stamps_ns: &[i64]) -> Vec<Option<Pose>> {
     stamps_ns.iter().map(|stamp_ns| trajectory.near(*stamp_ns, SLACK_NS)).collect()
 }
 
-/// All rows of a file.
-fn rows(path: &Path) -> Result<Vec<PoseRow>, Error> {
-    let mut rows = Vec::new();
+/// All rows of a file, and the index of the sweep that the first belongs to.
+fn rows(path: &Path) -> Result<(usize, Vec<PoseRow>), Error> {
+    let (mut first_sweep, mut rows) = (0, Vec::new());
     if path.extension().is_some_and(|e| e == "npy") {
         let array = npy::read(path)?;
         for (n, numbers) in array.values.chunks(array.columns).enumerate() {
@@ -95,12 +107,16 @@ fn rows(path: &Path) -> Result<Vec<PoseRow>, Error> {
         }
     } else {
         let text = whole::read_text(path)?;
+        if let Some((line, index)) = stated_first(&text) {
+            let wrong = || Error::input(path, format!("line {line}"), "not the index of a sweep");
+            first_sweep = index.trim().parse().map_err(|_| wrong())?;
+        }
         for (line, content) in text::lines(&text).filter(|(_, text)| !text.starts_with('#')) {
             let numbers = text::numbers(path, line, content)?;
             rows.push(row(path, format!("line {line}"), &numbers)?);
         }
     }
-    let Some(first) = rows.first() else { return Ok(rows) };
+    let Some(first) = rows.first() else { return Ok((first_sweep, rows)) };
     let (start, timed) = (first.pose.translation, first.time_s.is_some());
     for row in &rows {
         reach(start, &row.pose).map_err(|what| Error::input(path, &row.place, what))?;
@@ -109,7 +125,12 @@ fn rows(path: &Path) -> Result<Vec<PoseRow>, Error> {
             return Err(Error::input(path, &row.place, what));
         }
     }
-    Ok(rows)
+    Ok((first_sweep, rows))
+}
+
+/// The line and text of the index of the first sweep, if it is stated.
+fn stated_first(text: &str) -> Option<(usize, &str)> {
+    text::lines(text).find_map(|(line, content)| Some((line, content.strip_prefix(FIRST)?)))
 }
 
 fn row(path: &Path, place: String, numbers: &[f64]) -> Result<PoseRow, Error> {
@@ -141,6 +162,8 @@ fn row(path: &Path, place: String, numbers: &[f64]) -> Result<PoseRow, Error> {
 mod tests {
     use super::super::tests::Temp;
     use super::*;
+
+    use glam::DVec3;
 
     const S: i64 = 1_000_000_000;
 
@@ -179,6 +202,25 @@ mod tests {
         let skew = tum(0.0).replace("0 0 0 1", "0 0 0 0.5");
         assert!(refused("m.txt", &skew, &[0]).contains("does not have length 1"));
         assert!(refused("m.txt", &tum(f64::NAN), &[0]).contains("time of NaN s"));
+    }
+
+    #[test]
+    fn rows_of_a_part_of_a_recording() {
+        let t = Temp::new();
+        let poses = [1.0, 2.0].map(|x| Pose { translation: DVec3::X * x, ..Pose::IDENTITY });
+        for (first, expected) in [(0, [true, true, false, false]), (2, [false, false, true, true])]
+        {
+            let path = t.write("p.txt", pose_rows(first, &poses));
+            let found = read(&path, &[0; 4]).unwrap();
+            assert_eq!(found.iter().map(Option::is_some).collect::<Vec<_>>(), expected);
+            assert_eq!(found[first + 1].unwrap().translation.x, 2.0);
+        }
+        for (first, words) in [("3", "2 poses, expected 1"), ("9", "expected 0"), ("x", "line 1: ")]
+        {
+            let text = pose_rows(2, &poses).replace("sweep: 2", &format!("sweep: {first}"));
+            let e = read(&t.write("p.txt", text), &[0; 4]).unwrap_err().to_string();
+            assert!(e.contains(words), "{e}");
+        }
     }
 
     #[test]
