@@ -38,7 +38,7 @@ pub mod engine;
 pub mod error;
 mod figures;
 pub mod flow;
-mod inventory;
+pub mod inventory;
 pub mod laps;
 pub mod latency;
 #[cfg(feature = "pcap")]

@@ -128,9 +128,9 @@ impl PyPipeline {
         let mut this = slf.try_borrow_mut().map_err(busy)?;
         let this = &mut *this;
         let place = if let Ok(sweep) = points.cast::<PySweep>() {
-            if stamp.or(pose.map(|_| 0.0)).or(time.or(sensor).map(|_| 0.0)).is_some() {
+            if stamp.is_some() || [pose, twist, time, sensor].iter().any(Option::is_some) {
                 return Err(PyTypeError::new_err(
-                    "a Sweep already has stamp, pose, time and sensor",
+                    "a Sweep already has stamp, pose, twist, time and sensor",
                 ));
             }
             let PySweep { data, located } = sweep.get();

@@ -256,6 +256,8 @@ class Same(unittest.TestCase):
             self.assertIsNone(last.pose)
             with self.assertRaisesRegex(ValueError, "poses must be given"):
                 raywake.Pipeline(rig=recording.rig).step(last)
+            with self.assertRaisesRegex(TypeError, "a Sweep already has stamp, pose, twist"):
+                raywake.Pipeline(rig=recording.rig).step(last, twist=[0.0] * 6)
             self.assertEqual(last.points.tobytes(), returns["xyz"].tobytes())
             self.assertEqual((len(last), last.time.shape), (len(returns), last.intensity.shape))
             pipeline = raywake.Pipeline(rig=recording.rig, find_poses=True)

@@ -15,6 +15,7 @@ use raywake::args::BackendChoice;
 use raywake::batch::DEMO_DIGEST;
 use raywake::engine::{self, RunPlan};
 use raywake::error::RunError;
+use raywake::inventory::inventory;
 use raywake::outputs::RunFiles;
 use raywake::weight_files::WeightFiles;
 use raywake_core::digest::Digest;
@@ -71,13 +72,12 @@ impl Settings {
         }
     }
 
-    /// Everything that decides the rows of a drive. Of the drive itself: its poses, stamps and rig,
-    /// which also depend on how it is opened, and its labels.
-    fn key(&self, source: &dyn Source, labels: &Labels) -> serde_json::Value {
+    /// Everything that decides the rows of a drive. Of the drive itself: its files, its poses,
+    /// stamps and rig, which also depend on how it is opened, and its labels.
+    fn key(&self, files: &str, source: &dyn Source, labels: &Labels) -> serde_json::Value {
         let moments =
             (0..source.len()).map(|i| (source.frame(i), source.stamp_s(i), source.pose(i)));
-        let (rig, trusted) = (source.rig(), source.overview().trusted);
-        let drive = format!("{rig:?}{trusted}{:?}{labels:?}", moments.collect::<Vec<_>>());
+        let drive = format!("{:?}{:?}{labels:?}", source.rig(), moments.collect::<Vec<_>>());
         json!({
             "rows": ROWS,
             "algorithms": format!("{DEMO_DIGEST:016x}"),
@@ -89,6 +89,8 @@ impl Settings {
             "history": self.history,
             "sweeps": self.sweeps.min(source.len()),
             "drive": format!("{:016x}", Digest::of(drive.as_bytes())),
+            "files": files,
+            "trusted": source.overview().trusted,
         })
     }
 }
@@ -157,7 +159,7 @@ pub fn evaluate(
     let files = Files::of(out, name);
     let semantic = Semantic::of(path, source.as_ref());
     let labels = labels(path, source.as_ref(), semantic.is_some())?;
-    let key = settings.key(source.as_ref(), &labels);
+    let key = settings.key(&inventory(path)?, source.as_ref(), &labels);
     if files.rows.is_file()
         && let Ok(facts) = Facts::read(&files.facts)
         && facts.settings == key
