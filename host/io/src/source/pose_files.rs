@@ -36,9 +36,10 @@ struct PoseRow {
 /// The pose of a file at each of some stamps, ns; `None` where it has none.
 ///
 /// Rows without times belong to the first sweeps, or those from the index after [`FIRST`] on; so do
-/// rows with times of another clock if there is one for each sweep. Fails if a row is not a pose, if
-/// one is out of reach of any drive, if there are more rows without times than sweeps, and if no
-/// sweep has a pose.
+/// rows with times of another clock if there is one for each sweep.
+///
+/// Fails if a row is not a pose, if one is out of reach of any drive, if there are more rows
+/// without times than sweeps, and if no sweep has a pose.
 pub(super) fn read(path: &Path, stamps_ns: &[i64]) -> Result<Vec<Option<Pose>>, Error> {
     let ((first, rows), sweeps) = (rows(path)?, stamps_ns.len());
     let timed = rows.first().is_some_and(|row| row.time_s.is_some());
