@@ -69,9 +69,7 @@ impl Partial {
         self.kept = true;
         Ok(())
     }
-}
 
-impl Partial {
     /// Keeps what has been written, next to the path: `a.incomplete.mcap` for `a.mcap`. Returns
     /// where it is.
     pub fn keep_incomplete(mut self) -> Result<PathBuf, Error> {

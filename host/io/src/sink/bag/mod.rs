@@ -186,9 +186,7 @@ impl BagSink {
         self.live.into_iter().for_each(LiveServer::finish);
         self.file.map_or(Ok(()), MessageFile::finish)
     }
-}
 
-impl BagSink {
     /// Keeps what has been written to the file so far, without an index, under another name, which
     /// is returned if there is a file.
     pub fn keep_incomplete(self) -> Option<Result<PathBuf, Error>> {
