@@ -58,6 +58,7 @@ fn poses_are_found_and_useful() {
 
 /// Poses that alternate by 3 cm are replaced; those that slip are not.
 /// They belong to the sweeps they were found for.
+#[cfg(feature = "arrow")]
 #[test]
 fn poses_of_a_part() {
     let t = Temp::new();
