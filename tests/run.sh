@@ -153,10 +153,10 @@ aarch64() {
 aarch64 || echo "skipped: no aarch64 compiler, linker or emulator available"
 RAYWAKE_DIGEST_OF=$(printf "$PWD/%s:" "${others[@]}")
 export RAYWAKE_DIGEST_OF=${RAYWAKE_DIGEST_OF%:}
-# Of programs that are now built, what they were built from.
-mapfile -t built < <(find target -mindepth 2 -type d \( -name deps -o -name build \) -prune |
-    grep -v -e ^target/debug -e ^target/release)
-discard "${built[@]}" target/doc
+# Of programs that are now built, what they were built from: beside the fingerprints.
+mapfile -t built < <(find target -type d -name .fingerprint -prune -printf '%h\n' |
+    grep -v -x -e target/debug -e target/release)
+discard "${built[@]/%//deps}" "${built[@]/%//build}" target/doc
 
 say "tests"
 unable=()
