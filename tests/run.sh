@@ -173,6 +173,10 @@ fi
 
 say "tests with a reduced set of features"
 cargo test --quiet -p raywake -p raywake-io --no-default-features --features raywake/demo,raywake/png
+# Those of the README for a vehicle.
+for features in pcap pcap,arrow; do
+    cargo check --quiet -p raywake --no-default-features --features $features
+done
 
 say "the library for C"
 host/capi/tests/run.sh target/release/raywake

@@ -59,34 +59,20 @@ int main(int argc, char **argv) {
     raywake_estimator *estimator = NULL;
     must(raywake_create(&options, memory, bytes, &estimator, &error), "create", &error);
 
-    uint64_t digest = RAYWAKE_DIGEST_START, count = 0;
-    size_t room = 0, steps = 0;
-    file_point *points = NULL;
+    uint64_t digest = RAYWAKE_DIGEST_START;
+    size_t room = 0, steps = 0, count = 0;
+    file_sweep next = {0};
     raywake_point *flow = NULL;
     static raywake_object objects[RAYWAKE_OBJECTS_MAX];
-    raywake_pose pose;
-    raywake_twist twist;
-    raywake_sweep sweep = {.world_from_vehicle = &pose, .twist = &twist};
-    while (take(file, &sweep.stamp_s, 8)) {
-        need(file, &pose, sizeof pose);
-        need(file, &twist, sizeof twist);
-        need(file, &count, 8);
-        if (count > room) {
-            room = count;
-            free(points);
+    while (next_sweep(file, &next)) {
+        if (next.room > room) {
+            room = next.room;
             free(flow);
-            points = room_for(room * sizeof *points);
             flow = room_for(room * sizeof *flow);
         }
-        need(file, points, count * sizeof *points);
-        sweep.count = count;
-        sweep.xyz = points[0].xyz;
-        sweep.time_s = &points[0].time_s;
-        sweep.sensor = &points[0].sensor; /* the low byte */
-        sweep.xyz_stride = sweep.time_stride = sweep.sensor_stride = sizeof *points;
         raywake_result result;
         double start = seconds();
-        must(raywake_step(estimator, &sweep, &result, &error), "step", &error);
+        must(raywake_step(estimator, &next.sweep, &result, &error), "step", &error);
         if (steps < STEPS_MAX) times[steps++] = 1e3 * (seconds() - start);
 
         size_t moving = 0, driving = 0, seen = 0;
@@ -97,12 +83,12 @@ int main(int argc, char **argv) {
         must(raywake_add_to_digest(estimator, &digest), "digest", NULL);
         printf("%.3f s: %zu columns, %zu returns, %zu of them moving, %zu tracklets, %zu objects, "
                "%zu of them moving\n",
-               sweep.stamp_s, result.columns, result.points, moving, result.tracklets,
+               next.sweep.stamp_s, result.columns, result.points, moving, result.tracklets,
                result.objects, driving);
     }
     must(raywake_destroy(estimator), "destroy", NULL);
     free(flow);
-    free(points);
+    free(next.points);
     free(memory);
     fclose(file);
     if (steps > 1) {

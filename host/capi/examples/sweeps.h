@@ -20,6 +20,43 @@ static void need(FILE *file, void *to, size_t bytes) {
     }
 }
 
+/* A sweep of the file, and what it points to; zeros before the first. */
+typedef struct {
+    raywake_sweep sweep;
+    raywake_pose pose;
+    raywake_twist twist;
+    file_point *points;
+    size_t room;
+} file_sweep;
+
+/* Reads the next sweep; 0 at the end of the file. */
+static int next_sweep(FILE *file, file_sweep *to) {
+    uint64_t count = 0;
+    if (!take(file, &to->sweep.stamp_s, 8)) return 0;
+    need(file, &to->pose, sizeof to->pose);
+    need(file, &to->twist, sizeof to->twist);
+    need(file, &count, 8);
+    if (count > to->room || !to->points) {
+        free(to->points);
+        to->room = count;
+        to->points = malloc((count ? count : 1) * sizeof *to->points);
+        if (!to->points) exit(6);
+    }
+    file_point *points = to->points;
+    need(file, points, count * sizeof *points);
+    to->sweep = (raywake_sweep){.stamp_s = to->sweep.stamp_s,
+                                .world_from_vehicle = &to->pose,
+                                .twist = &to->twist,
+                                .count = count,
+                                .xyz = points->xyz,
+                                .time_s = &points->time_s,
+                                .sensor = &points->sensor, /* the low byte */
+                                .xyz_stride = sizeof *points,
+                                .time_stride = sizeof *points,
+                                .sensor_stride = sizeof *points};
+    return 1;
+}
+
 /* Reads the rig at the start of the file. */
 static raywake_options rig_of(FILE *file) {
     raywake_options options = {.abi_version = RAYWAKE_ABI_VERSION};

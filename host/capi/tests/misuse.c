@@ -232,11 +232,10 @@ static uint64_t drive(const char *path, int disturbed, int all) {
     if (!file) exit(3);
     raywake_options o = rig_of(file);
     o.threads = all ? 1 : 2, o.find_poses = o.objects = all;
-    uint64_t count, digest = RAYWAKE_DIGEST_START;
+    uint64_t digest = RAYWAKE_DIGEST_START;
     size_t bytes = 0, room = 262144;
     EXPECT(raywake_memory_needed(&o, &bytes, NULL), OK);
     void *memory = malloc(bytes);
-    file_point *points = malloc(room * sizeof *points);
     raywake_point *flow = malloc(room * sizeof *flow);
     raywake_column *columns = malloc(room * sizeof *columns);
     raywake_tracklet *tracklets = malloc(room * sizeof *tracklets);
@@ -246,22 +245,15 @@ static uint64_t drive(const char *path, int disturbed, int all) {
     pthread_t other;
     shared = e, stop = 0;
     if (disturbed) pthread_create(&other, NULL, disturb, NULL);
-    raywake_pose pose;
-    raywake_twist twist;
     raywake_result result;
-    raywake_sweep s = {.world_from_vehicle = &pose, .twist = &twist, .xyz = points};
-    s.time_s = &points->time_s, s.sensor = &points->sensor; /* the low byte */
-    s.xyz_stride = s.time_stride = s.sensor_stride = sizeof *points;
+    file_sweep next = {0};
     int sweeps = 0;
-    while (take(file, &s.stamp_s, 8)) {
-        need(file, &pose, sizeof pose), need(file, &twist, sizeof twist), need(file, &count, 8);
-        CHECK(count <= room);
-        need(file, points, count * sizeof *points);
-        s.count = count;
-        if (all) s.world_from_vehicle = NULL, s.twist = NULL;
+    while (next_sweep(file, &next)) {
+        CHECK(next.sweep.count <= room);
+        if (all) next.sweep.world_from_vehicle = NULL, next.sweep.twist = NULL;
         long before = allocated();
         raywake_status status;
-        do status = raywake_step(e, &s, &result, NULL);
+        do status = raywake_step(e, &next.sweep, &result, NULL);
         while (status == RAYWAKE_STATUS_BUSY);
         expect(__LINE__, status, RAYWAKE_STATUS_OK);
         if (!disturbed) {
@@ -277,7 +269,7 @@ static uint64_t drive(const char *path, int disturbed, int all) {
     stop = 1;
     if (disturbed) pthread_join(other, NULL);
     EXPECT(raywake_destroy(e), OK);
-    free(objects), free(tracklets), free(columns), free(flow), free(points), free(memory);
+    free(objects), free(tracklets), free(columns), free(flow), free(next.points), free(memory);
     fclose(file);
     CHECK(sweeps > 1);
 #ifdef COUNT_ALLOCATIONS

@@ -28,24 +28,8 @@ int main(int argc, char **argv) {
     must(raywake_memory_needed(&options, &bytes, NULL));
     raywake_estimator *estimator = NULL;
     must(raywake_create(&options, room_for(bytes), bytes, &estimator, NULL));
-    raywake_pose pose;
-    raywake_twist twist;
-    raywake_sweep sweep = {.world_from_vehicle = &pose, .twist = &twist};
-    while (take(file, &sweep.stamp_s, 8)) {
-        uint64_t count = 0;
-        need(file, &pose, sizeof pose);
-        need(file, &twist, sizeof twist);
-        need(file, &count, 8);
-        file_point *points = room_for(count * sizeof *points);
-        need(file, points, count * sizeof *points);
-        sweep.count = count;
-        sweep.xyz = points[0].xyz;
-        sweep.time_s = &points[0].time_s;
-        sweep.sensor = &points[0].sensor; /* the low byte */
-        sweep.xyz_stride = sweep.time_stride = sweep.sensor_stride = sizeof *points;
-        must(raywake_step(estimator, &sweep, NULL, NULL));
-        free(points);
-    }
+    file_sweep next = {0};
+    while (next_sweep(file, &next)) must(raywake_step(estimator, &next.sweep, NULL, NULL));
 #define WRITE(read, type)                                                                        \
     do {                                                                                         \
         size_t count = 0;                                                                        \

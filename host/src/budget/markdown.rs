@@ -48,8 +48,8 @@ leaves out.
 ";
 
 const COMMANDS_HEAD: &str = "\
-`load` runs once, before the first sweep, the others once for every sweep or band of keys. What
-kernels read and write depends on the sweep.
+Every program runs once a sweep, except `load`, which runs before the first, and `map count` and
+`map band`. What kernels read and write depends on the sweep.
 ";
 
 const TRACKS_HEAD: &str = "

@@ -1,5 +1,7 @@
 //! Stand-in for [`BagSink`] in builds that cannot write messages; never constructed.
 
+use std::path::PathBuf;
+
 use raywake_core::output::PairFlows;
 use raywake_core::sweep::Point;
 use raywake_objects::tracked::TrackedObject;
@@ -53,6 +55,11 @@ impl Absent {
     /// Never called.
     pub fn cloud(&mut self, _: &SweepData, _: &[Point]) -> Result<(), Error> {
         match *self {}
+    }
+
+    /// Never called.
+    pub fn keep_incomplete(self) -> Option<Result<PathBuf, Error>> {
+        match self {}
     }
 
     /// Never called.

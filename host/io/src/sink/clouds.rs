@@ -1,6 +1,6 @@
 //! Clouds and labels as files.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 use raywake_core::sweep::Point;
@@ -68,20 +68,24 @@ pub fn write_ply<const N: usize>(
     rows: &[[f32; N]],
 ) -> Result<(), Error> {
     atomic::write(path, |out| {
-        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", rows.len())?;
-        names.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
-        writeln!(out, "end_header")?;
+        ply_head(out, rows.len(), &names.map(|name| ("float", name)))?;
         rows.as_flattened().iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))
     })
+}
+
+/// Writes the head of a PLY file: the number of vertices, and their properties as type and name.
+fn ply_head(out: &mut dyn Write, count: usize, properties: &[(&str, &str)]) -> io::Result<()> {
+    write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}\n")?;
+    properties.iter().try_for_each(|(kind, name)| writeln!(out, "property {kind} {name}"))?;
+    writeln!(out, "end_header")
 }
 
 /// Writes a map of points in the world, where `float` would have steps of decimetres: `x`, `y`, `z`
 /// (m) as `double`, and `intensity`.
 pub fn write_map(path: &Path, points: &[([f64; 3], f32)]) -> Result<(), Error> {
     atomic::write(path, |out| {
-        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", points.len())?;
-        ["x", "y", "z"].iter().try_for_each(|name| writeln!(out, "property double {name}"))?;
-        write!(out, "property float intensity\nend_header\n")?;
+        let place = ["x", "y", "z"].map(|name| ("double", name));
+        ply_head(out, points.len(), &[&place[..], &[("float", "intensity")]].concat())?;
         points.iter().try_for_each(|(at, intensity)| {
             at.iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))?;
             out.write_all(&intensity.to_le_bytes())
