@@ -21,6 +21,7 @@ use std::time::Duration;
 use clap::builder::BoolishValueParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
+use raywake_core::params::Profile;
 use raywake_io::Error;
 use raywake_io::source::{BinFields, Format, OpenOptions, PosesFrame, Unlocated};
 use raywake_simd::Simd;
@@ -361,6 +362,11 @@ impl Recording {
 }
 
 impl RecordingKind {
+    /// Makes a profile, whatever it says, compensate motion if that is asked for.
+    pub fn adapt(&self, profile: &mut Profile) {
+        profile.deskew |= self.deskew == Some(true);
+    }
+
     /// Options for [`raywake_io::source::open`], without poses.
     pub fn options(&self) -> OpenOptions {
         OpenOptions {

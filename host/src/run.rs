@@ -16,8 +16,7 @@ use raywake_io::source;
 /// Estimates the flow of a recorded drive.
 fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
     let mut profile = config::profile(&args.flow.profile)?;
-    // If asked for explicitly, it applies to every profile.
-    profile.deskew |= args.recording.kind.deskew == Some(true);
+    args.recording.kind.adapt(&mut profile);
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let mut source = source::open(args.recordings.path(), &args.recording.options())?;
     let plan = RunPlan {

@@ -198,7 +198,8 @@ class Same(unittest.TestCase):
             theirs = np.stack([table[column].to_numpy() for column in columns], -1)
             ours = records[name].reshape(len(records), -1)
             if name == "covariance":
-                ours = ours.reshape(-1, 5, 5)[:, *np.triu_indices(5)]
+                rows, columns = np.triu_indices(5)
+                ours = ours.reshape(-1, 5, 5)[:, rows, columns]
             if name == "basis":
                 ours = np.hstack([ours > 0, ours > 1])
             np.testing.assert_array_equal(ours, theirs, name)

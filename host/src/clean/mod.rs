@@ -47,7 +47,7 @@ const MOVING_MIN: f32 = 0.4;
 fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let mut source = source::open(args.recordings.path(), &args.recording.options())?;
     let mut profile = config::profile(&args.flow.profile)?;
-    profile.deskew |= args.recording.kind.deskew == Some(true);
+    args.recording.kind.adapt(&mut profile);
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let sweeps = args.part.range(source.len())?;
     let made = ResultSettings {

@@ -98,7 +98,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
 fn settings(args: &args::TrackArgs) -> Result<Settings, RunError> {
     let objects = TrackingParams { estimate: args.estimate.params(), ..TrackingParams::DEFAULT };
     let mut settings = config::settings_over(&args.flow.profile, objects)?;
-    settings.profile.deskew |= args.recording.kind.deskew == Some(true);
+    args.recording.kind.adapt(&mut settings.profile);
     Ok(settings)
 }
 

@@ -20,6 +20,11 @@ pub(super) enum HeaderNumber {
     ValuesV2,
 }
 
+impl HeaderNumber {
+    /// How many there are.
+    pub const COUNT: usize = HeaderNumber::ValuesV2 as usize + 1;
+}
+
 /// The type of a field.
 pub(super) enum FieldType {
     /// Not known.

@@ -30,7 +30,7 @@ pub(super) fn is_footer(bytes: &[u8]) -> bool {
 /// The page header at the start of some bytes. `None` for types other than data and dictionaries
 /// too: the decoder takes the data of an index for another header.
 pub(super) fn page_header(bytes: &[u8]) -> Option<PageHeader> {
-    let mut numbers = [None; 6];
+    let mut numbers = [None; HeaderNumber::COUNT];
     let see = |number, value: i64| numbers[number as usize] = usize::try_from(value).ok();
     let mut elements = Elements { left: bytes, see };
     elements.fields(format::PAGE_HEADER, 0)?;
