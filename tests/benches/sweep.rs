@@ -8,9 +8,11 @@
 
 use glam::DVec3;
 use raywake::map::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
+use raywake::team::lead;
 use raywake_core::params::Profile;
 use raywake_core::stages::background_filter;
-use raywake_embed::{EstimatorOptions, FlowEstimator, SweepPlace, TeamEstimator};
+use raywake_core::sweep::Point;
+use raywake_embed::{EstimatorOptions, FlowEstimator, ReturnsBy, SweepPlace, TeamEstimator};
 use raywake_gpu::Options;
 use raywake_objects::centroid_ekf::{CentroidEkf, CentroidParams};
 use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag, MODEL_MAX};
@@ -20,6 +22,7 @@ use raywake_tests::drives::{Setup, pairs, sweep};
 use raywake_tests::table::{Variant, table};
 use raywake_tests::vulkan;
 use std::collections::BTreeMap;
+use std::thread;
 use std::time::Instant;
 
 fn milliseconds(since: Instant) -> f64 {
@@ -57,9 +60,27 @@ fn flow(sweeps: &[SimSweep]) {
     table(title, &variants, &[(0, 2), (1, 3), (0, 1), (2, 3)], &[(0, 2), (1, 3)]);
 }
 
+/// A sweep as callers of the libraries keep it.
+struct PointColumns {
+    positions: Vec<[f32; 3]>,
+    times: Vec<f32>,
+    sensors: Vec<u8>,
+}
+
+impl PointColumns {
+    fn of(sweep: &SimSweep) -> PointColumns {
+        let points = sweep.points.iter();
+        PointColumns {
+            positions: points.clone().map(|p| p.position).collect(),
+            times: points.clone().map(|p| p.offset_s).collect(),
+            sensors: points.map(|p| p.sensor as u8).collect(),
+        }
+    }
+}
+
 /// A step of the program next to one of the estimator behind the C and Python libraries, which
-/// copies the sweep and is called through its desk. They take turns sweep by sweep.
-fn embedded(sweeps: &[SimSweep]) {
+/// copies the sweep and hands it to a thread of its own. They take turns sweep by sweep.
+fn embedded(threads: usize, sweeps: &[SimSweep]) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
     let mut drive = setup.drive(setup.scalar());
     let options = EstimatorOptions {
@@ -69,9 +90,17 @@ fn embedded(sweeps: &[SimSweep]) {
         registers: false,
         objects: false,
     };
-    let mut team = TeamEstimator::on_heap(&options, 1).unwrap_or_else(|e| panic!("{e}"));
+    let mut team = TeamEstimator::on_heap(&options, threads).unwrap_or_else(|e| panic!("{e}"));
     let mut variants = ["program", "library"].map(|name| Variant::new(format!("step, {name}")));
+    let columns: Vec<PointColumns> = pairs(sweeps).map(|(now, _)| PointColumns::of(now)).collect();
     for (n, (now, before)) in pairs(sweeps).enumerate() {
+        let columns = &columns[n];
+        let at = |n: usize| Point {
+            position: columns.positions[n],
+            intensity: 0.0,
+            offset_s: columns.times[n],
+            sensor: u32::from(columns.sensors[n]),
+        };
         for turn in 0..2 {
             let which = (n + turn) % 2;
             let variant = &mut variants[which];
@@ -85,7 +114,7 @@ fn embedded(sweeps: &[SimSweep]) {
             } else {
                 let pose = Some(now.world_from_vehicle);
                 let place = SweepPlace { stamp_s: now.stamp_s, pose, twist: Some(now.twist) };
-                let stepped = team.step(&place, now.points.iter().copied());
+                let stepped = team.step(&place, ReturnsBy { count: now.points.len(), at });
                 variant.add(n, "total", milliseconds(clock));
                 stepped.unwrap_or_else(|e| panic!("{e}"));
                 let columns = |e: &FlowEstimator| {
@@ -95,7 +124,8 @@ fn embedded(sweeps: &[SimSweep]) {
             }
         }
     }
-    table("libraries, profile hdl64, ms a sweep", &variants, &[(0, 1)], &[(0, 1)]);
+    let title = format!("libraries, profile hdl64, {threads} threads, ms a sweep");
+    table(&title, &variants, &[(1, 0)], &[(0, 1)]);
 }
 
 /// The sparse map on either backend.
@@ -247,9 +277,16 @@ fn main() {
     let options = raywake_sim::Options { sweeps: count + 1, ego, ..Default::default() };
     let sweeps: Vec<SimSweep> = Drive::new(3, options).collect();
     let points = sweeps.iter().map(|s| s.points.len()).sum::<usize>() / sweeps.len();
-    println!("{count} simulated sweeps of {points} returns; medians; a/b: a divided by b");
+    println!(
+        "{count} simulated sweeps of {points} returns; medians; a/b: median of a divided by b"
+    );
     flow(&sweeps);
-    embedded(&sweeps);
+    for threads in [1, 2] {
+        // A thread leads one team.
+        thread::scope(|scope| {
+            scope.spawn(|| lead(threads, || embedded(threads, &sweeps)));
+        });
+    }
     map(&sweeps);
     tracks(&sweeps);
 }

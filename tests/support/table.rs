@@ -34,9 +34,18 @@ impl Variant {
         values[n] += value;
     }
 
+    fn values(&self, row: &str) -> Option<&[f64]> {
+        Some(&self.rows.iter().find(|r| r.0 == row)?.1)
+    }
+
     fn median(&self, row: &str) -> Option<f64> {
-        let (_, values) = self.rows.iter().find(|r| r.0 == row)?;
-        Some(median(values.iter().copied()))
+        Some(median(self.values(row)?.iter().copied()))
+    }
+
+    /// Median over sweeps of what this takes divided by what `other` takes.
+    fn ratio(&self, other: &Variant, row: &str) -> Option<f64> {
+        let both = self.values(row)?.iter().zip(other.values(row)?);
+        Some(median(both.map(|(a, b)| a / b)))
     }
 }
 
@@ -74,7 +83,8 @@ pub fn table(
         print!("{row:22}");
         medians.iter().for_each(|m| print!("{:>11}", text(*m)));
         for (a, b) in &ratios {
-            print!("{:>9}", text(medians[*a].zip(medians[*b]).map(|(a, b)| a / b)));
+            let ratio = variants[*a].ratio(&variants[*b], row);
+            print!("{:>9}", ratio.map_or("-".to_string(), |r| format!("{r:.3}")));
         }
         println!();
     }

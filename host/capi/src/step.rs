@@ -6,7 +6,7 @@ use glam::DVec3;
 use raywake_core::continuity::Reset;
 use raywake_core::pose::Twist;
 use raywake_core::sweep::Point;
-use raywake_embed::{StepSummary, SweepPlace};
+use raywake_embed::{ReturnSource, ReturnsBy, StepSummary, SweepPlace};
 use raywake_registration::odometry::PoseStatus;
 
 use crate::create::CPose;
@@ -125,6 +125,9 @@ struct Column {
     stride: usize,
 }
 
+// SAFETY: the caller's numbers are only read, and it does not change them meanwhile.
+unsafe impl Sync for Column {}
+
 static ZERO: f32 = 0.0;
 
 impl Column {
@@ -191,7 +194,7 @@ impl SweepInput {
 
     /// # Safety
     /// As for [`raywake_step`].
-    unsafe fn points(&self) -> Result<impl ExactSizeIterator<Item = Point> + use<>, Refusal> {
+    unsafe fn points(&self) -> Result<impl ReturnSource + use<>, Refusal> {
         let count = self.count;
         let xyz = Column::new(self.xyz, self.xyz_stride, 12, count, "xyz")?;
         let optional = |start: *const c_void, stride, bytes, what| match start.is_null() {
@@ -200,12 +203,13 @@ impl SweepInput {
         };
         let time = optional(self.time_s, self.time_stride, 4, "time")?;
         let sensor = optional(self.sensor, self.sensor_stride, 1, "sensor")?;
-        Ok((0..count).map(move |n| {
+        let at = move |n| {
             // SAFETY: guaranteed by the caller.
             let (position, offset_s, sensor) =
                 unsafe { (xyz.get(n), time.get(n), sensor.get::<u8>(n)) };
             Point { position, intensity: 0.0, offset_s, sensor: u32::from(sensor) }
-        }))
+        };
+        Ok(ReturnsBy { count, at })
     }
 }
 

@@ -9,7 +9,7 @@ use raywake_core::pipeline::Pipeline;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Sweep};
-use raywake_core::team::Team;
+use raywake_core::team::{Team, share};
 use raywake_core::weights::WeightsError;
 use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
@@ -19,6 +19,7 @@ use raywake_registration::odometry::{EXPECTED_WITHIN_M, PoseStatus};
 use crate::memory::{AtRest, Memory, array, bytes_of, state};
 use crate::options::{CreateError, EstimatorOptions};
 use crate::place::{SweepError, SweepPlace, normalised};
+use crate::returns::ReturnSource;
 use crate::summary::StepSummary;
 
 impl AtRest for Pipeline {
@@ -63,6 +64,9 @@ struct LastSweep {
     pose: Pose,
     twist: Twist,
 }
+
+/// Returns copied at a time by one thread: about 0.03 ms of work.
+const COPIED_MAX: usize = 8192;
 
 /// Returns of a sweep.
 struct SweepBuffers {
@@ -171,29 +175,21 @@ impl FlowEstimator {
         &mut self,
         team: &impl Team,
         place: &SweepPlace,
-        points: impl ExactSizeIterator<Item = Point>,
+        points: impl ReturnSource,
     ) -> Result<StepSummary, SweepError> {
-        self.receive(place, points)?;
+        let count = points.count();
+        self.admit(place, count)?;
+        self.pair = None;
+        self.sweeps.swap(0, 1);
+        let now = &mut self.sweeps[0];
+        now.count = count;
+        let room = &mut now.points[..count];
+        share(team, COPIED_MAX, 0..count, room, 1, &|piece, to| points.copy(piece.start, to));
         Ok(self.advance(team, place))
     }
 
-    /// Takes the returns of a sweep.
-    pub(crate) fn receive(
-        &mut self,
-        place: &SweepPlace,
-        points: impl ExactSizeIterator<Item = Point>,
-    ) -> Result<(), SweepError> {
-        self.admit(place, points.len())?;
-        self.pair = None;
-        self.sweeps.swap(0, 1);
-        let SweepBuffers { points: room, count } = &mut self.sweeps[0];
-        // An iterator with a wrong length yields what it has, as far as there is room.
-        *count = room.iter_mut().zip(points).map(|(to, point)| *to = point).count();
-        Ok(())
-    }
-
     /// Does the work for the sweep received.
-    pub(crate) fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
+    fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
         let (pose, twist, pose_status) = self.locate(place);
         let [now, before] = &self.sweeps;
         let sweep =

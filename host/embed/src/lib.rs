@@ -13,6 +13,7 @@ mod memory;
 mod options;
 mod place;
 mod records;
+mod returns;
 mod summary;
 #[cfg(feature = "std")]
 mod team_estimator;
@@ -23,6 +24,7 @@ pub use options::{CreateError, EstimatorOptions};
 pub use place::{SweepError, SweepPlace};
 pub use raywake_objects::front_end::TRACKS_MAX as OBJECTS_MAX;
 pub use records::{ColumnRecord, NO_CLASS, ObjectRecord, PointRecord, TrackletRecord};
+pub use returns::{ReturnSource, ReturnsBy};
 pub use summary::{PairSummary, StepSummary};
 #[cfg(feature = "std")]
 pub use team_estimator::{StepError, TeamError, TeamEstimator};

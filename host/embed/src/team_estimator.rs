@@ -5,16 +5,18 @@
 
 use std::fmt;
 use std::io;
+use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use rayon_core::{ThreadPool, ThreadPoolBuilder};
-use raywake_core::sweep::Point;
 use raywake_team::ThreadTeam;
 
 use crate::memory::HeapMemory;
-use crate::{CreateError, EstimatorOptions, FlowEstimator, StepSummary, SweepError, SweepPlace};
+use crate::{
+    CreateError, EstimatorOptions, FlowEstimator, ReturnSource, StepSummary, SweepError, SweepPlace,
+};
 
 /// Why a step has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,8 +71,8 @@ struct Work {
 
 enum StepOrder {
     None,
-    /// The returns are in place.
-    Step(SweepPlace),
+    /// The caller waits, and lends the returns as long.
+    Step(SweepPlace, &'static dyn ReturnSource),
     Done(Result<StepSummary, StepError>),
     Quit,
 }
@@ -144,13 +146,12 @@ impl TeamEstimator {
     pub fn step(
         &mut self,
         place: &SweepPlace,
-        points: impl ExactSizeIterator<Item = Point>,
+        points: impl ReturnSource,
     ) -> Result<StepSummary, StepError> {
         let mut work = self.exchange.work();
-        work.contain(|estimator| estimator.receive(place, points))?.map_err(StepError::Sweep)?;
         match self.pool {
-            None => work.step(place),
-            Some(_) => self.exchange.order(work, place),
+            None => work.step(place, &points),
+            Some(_) => self.exchange.order(work, place, &points),
         }
     }
 
@@ -185,8 +186,13 @@ impl Exchange {
         &self,
         mut work: MutexGuard<Work>,
         place: &SweepPlace,
+        points: &dyn ReturnSource,
     ) -> Result<StepSummary, StepError> {
-        work.order = StepOrder::Step(*place);
+        // SAFETY: this returns only when the step is done; the order is gone by then, and nothing
+        // else keeps the returns.
+        let lent =
+            unsafe { mem::transmute::<&dyn ReturnSource, &'static dyn ReturnSource>(points) };
+        work.order = StepOrder::Step(*place, lent);
         self.changed.notify_all();
         loop {
             if let StepOrder::Done(result) = work.order {
@@ -202,8 +208,8 @@ impl Exchange {
         let mut work = self.work();
         loop {
             match work.order {
-                StepOrder::Step(place) => {
-                    let result = work.step(&place);
+                StepOrder::Step(place, points) => {
+                    let result = work.step(&place, points);
                     work.order = StepOrder::Done(result);
                     self.changed.notify_all();
                 }
@@ -215,8 +221,13 @@ impl Exchange {
 }
 
 impl Work {
-    fn step(&mut self, place: &SweepPlace) -> Result<StepSummary, StepError> {
-        self.contain(|estimator| estimator.advance(&ThreadTeam::new(None), place))
+    fn step(
+        &mut self,
+        place: &SweepPlace,
+        points: &dyn ReturnSource,
+    ) -> Result<StepSummary, StepError> {
+        let team = ThreadTeam::new(None);
+        self.contain(|estimator| estimator.step(&team, place, points))?.map_err(StepError::Sweep)
     }
 
     /// Lets nothing unwind into the caller, who may not be written in Rust. What panicked may have

@@ -10,8 +10,8 @@ use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
 use raywake_core::team::SingleThread;
 use raywake_embed::{
-    CreateError, EstimatorOptions, FlowEstimator, Memory, ObjectRecord, StepError, SweepError,
-    SweepPlace, TeamEstimator,
+    CreateError, EstimatorOptions, FlowEstimator, Memory, ObjectRecord, ReturnsBy, StepError,
+    SweepError, SweepPlace, TeamEstimator,
 };
 use raywake_sim::{Drive, Ego, Options, SimSweep};
 
@@ -53,7 +53,7 @@ fn threads_change_nothing() {
     let mut alone = estimator(&options());
     let mut expected = Digest::default();
     for sweep in sweeps() {
-        alone.step(&SingleThread, &place(sweep), sweep.points.iter().copied()).unwrap();
+        alone.step(&SingleThread, &place(sweep), &sweep.points[..]).unwrap();
         alone.add_to(&mut expected);
     }
     assert!(alone.columns().iter().any(|c| c.velocity_world_mps != [0.0; 2]));
@@ -62,7 +62,7 @@ fn threads_change_nothing() {
         assert_eq!(team.threads(), threads);
         let mut digest = Digest::default();
         for sweep in sweeps() {
-            let found = team.step(&place(sweep), sweep.points.iter().copied()).unwrap();
+            let found = team.step(&place(sweep), &sweep.points[..]).unwrap();
             team.read(|estimator| {
                 estimator.add_to(&mut digest);
                 let pair = found.pair.map(|pair| (pair.columns, pair.points));
@@ -87,14 +87,14 @@ fn objects_are_followed() {
     let mut team = TeamEstimator::new(estimator(&following), 2).unwrap();
     let mut digests = [Digest::default(); 2];
     for sweep in sweeps() {
-        let points = || sweep.points.iter().copied();
-        let found = plain.step(&SingleThread, &place(sweep), points()).unwrap();
+        let points = &sweep.points[..];
+        let found = plain.step(&SingleThread, &place(sweep), points).unwrap();
         assert_eq!((found.objects, plain.objects()), (0, &[][..]));
-        let found = alone.step(&SingleThread, &place(sweep), points()).unwrap();
+        let found = alone.step(&SingleThread, &place(sweep), points).unwrap();
         assert_eq!(found.objects, alone.objects().len());
         plain.add_to(&mut digests[0]);
         alone.add_to(&mut digests[1]);
-        assert_eq!(team.step(&place(sweep), points()), Ok(found));
+        assert_eq!(team.step(&place(sweep), points), Ok(found));
         team.read(|team| assert_eq!(team.objects(), alone.objects())).unwrap();
     }
     assert_eq!(digests[0], digests[1]);
@@ -109,17 +109,18 @@ fn objects_are_followed() {
 #[test]
 fn panics_are_contained() {
     let sweep = &sweeps()[0];
-    let points = || sweep.points.iter().copied();
+    let points = &sweep.points[..];
     for threads in [1, 2] {
         let team = || TeamEstimator::new(estimator(&options()), threads).unwrap();
         let mut receiving = team();
-        let broken = points().map(|p| if p.sensor == 0 { panic!("a defect") } else { p });
+        let at = |n| if n == points.len() / 2 { panic!("a defect") } else { points[n] };
+        let broken = ReturnsBy { count: points.len(), at };
         assert_eq!(receiving.step(&place(sweep), broken), Err(StepError::Failed));
         let mut reading = team();
-        assert!(reading.step(&place(sweep), points()).is_ok());
+        assert!(reading.step(&place(sweep), points).is_ok());
         assert_eq!(reading.read(|_| panic!("a defect")), Err::<(), _>(StepError::Failed));
         for mut failed in [receiving, reading] {
-            assert_eq!(failed.step(&place(sweep), points()), Err(StepError::Failed));
+            assert_eq!(failed.step(&place(sweep), points), Err(StepError::Failed));
             assert_eq!(failed.read(FlowEstimator::tracklet_count), Err(StepError::Failed));
         }
     }
@@ -130,15 +131,15 @@ fn poses_are_found_and_twists_follow_from_poses() {
     let mut finding = estimator(&EstimatorOptions { registers: true, ..options() });
     let mut given = estimator(&options());
     for sweep in sweeps() {
-        let points = || sweep.points.iter().copied();
+        let points = &sweep.points[..];
         let here = SweepPlace { stamp_s: sweep.stamp_s, ..SweepPlace::default() };
-        let found = finding.step(&SingleThread, &here, points()).unwrap();
+        let found = finding.step(&SingleThread, &here, points).unwrap();
         assert!(found.pose_status.is_some());
         let first = sweeps()[0].world_from_vehicle;
         let off = (first.inverse() * sweep.world_from_vehicle).inverse() * found.pose;
         assert!(off.translation.length() < 0.1, "{off:?}");
         let with_pose = SweepPlace { pose: Some(sweep.world_from_vehicle), ..here };
-        let made = given.step(&SingleThread, &with_pose, points()).unwrap();
+        let made = given.step(&SingleThread, &with_pose, points).unwrap();
         assert_eq!((made.pose, made.pose_status), (sweep.world_from_vehicle, None));
         assert_eq!(made.pair.is_some(), made.reset.is_none());
     }
@@ -199,9 +200,9 @@ fn give_invalid_sweeps(estimator: &mut FlowEstimator, here: SweepPlace, points: 
         (SweepPlace { twist: fast, ..here }, SweepError::Implausible),
         (SweepPlace { pose: None, ..here }, SweepError::Pose),
     ] {
-        assert_eq!(estimator.step(&SingleThread, &place, points.iter().copied()), Err(why));
+        assert_eq!(estimator.step(&SingleThread, &place, points), Err(why));
     }
-    let many = std::iter::repeat_n(Point::default(), 150_001);
+    let many = ReturnsBy { count: 150_001, at: |_| Point::default() };
     assert_eq!(estimator.step(&SingleThread, &here, many), Err(SweepError::Points(150_000)));
 }
 
@@ -214,7 +215,7 @@ fn an_invalid_sweep_changes_nothing() {
             if pestered {
                 give_invalid_sweeps(&mut estimator, place(sweep), &sweep.points);
             }
-            estimator.step(&SingleThread, &place(sweep), sweep.points.iter().copied()).unwrap();
+            estimator.step(&SingleThread, &place(sweep), &sweep.points[..]).unwrap();
             estimator.add_to(&mut digest);
         }
         digest
@@ -230,11 +231,8 @@ fn no_points_and_many_bad_ones() {
             SweepPlace { stamp_s: 0.1 * f64::from(n), pose: Some(Pose::IDENTITY), twist: None };
         let bad = Point { position: [f32::NAN; 3], ..Point::default() };
         let count = if n == 1 { 0 } else { 1000 };
-        let found = team.step(&here, std::iter::repeat_n(bad, count)).unwrap();
+        let found = team.step(&here, ReturnsBy { count, at: |_| bad }).unwrap();
         assert_eq!(found.dropped.not_finite, count as u64);
     }
-    assert_eq!(
-        team.step(&SweepPlace::default(), std::iter::empty()),
-        Err(StepError::Sweep(SweepError::Pose))
-    );
+    assert_eq!(team.step(&SweepPlace::default(), &[][..]), Err(StepError::Sweep(SweepError::Pose)));
 }

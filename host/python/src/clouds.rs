@@ -96,7 +96,7 @@ fn rows(
     let sweeps = [(0.0, Pose::IDENTITY, first), (dt_s, motion, second)];
     for (stamp_s, pose, points) in sweeps {
         let place = SweepPlace { stamp_s, pose: Some(pose), twist: Some(Default::default()) };
-        let step = team.step(&place, points.iter().copied());
+        let step = team.step(&place, points);
         let summary = step.map_err(|e| PyValueError::new_err(e.to_string()))?;
         if stamp_s > 0.0
             && let Some(reset) = summary.reset

@@ -33,7 +33,7 @@ use crate::rig::PyRig;
 #[pyclass(module = "raywake", name = "Pipeline")]
 pub struct PyPipeline {
     team: TeamEstimator,
-    /// Returns of the current sweep.
+    /// Returns of the last sweep given as arrays.
     points: Vec<Point>,
     /// Steps so far.
     steps: u64,
@@ -127,31 +127,31 @@ impl PyPipeline {
         let busy = |_| PyRuntimeError::new_err("another thread is in a step of this pipeline");
         let mut this = slf.try_borrow_mut().map_err(busy)?;
         let this = &mut *this;
-        let place = if let Ok(sweep) = points.cast::<PySweep>() {
+        let (place, returns) = if let Ok(sweep) = points.cast::<PySweep>() {
             if stamp.is_some() || [pose, twist, time, sensor].iter().any(Option::is_some) {
                 return Err(PyTypeError::new_err(
                     "a Sweep already has stamp, pose, twist, time and sensor",
                 ));
             }
             let PySweep { data, located } = sweep.get();
-            this.points.clone_from(&data.points);
             let given = *located && !this.find_poses;
-            SweepPlace {
+            let place = SweepPlace {
                 stamp_s: data.stamp_s,
                 pose: given.then_some(data.world_from_vehicle),
                 twist: given.then_some(data.twist),
-            }
+            };
+            (place, &data.points)
         } else {
             arrays::points(&mut this.points, points, time, sensor)?;
-            SweepPlace {
+            let place = SweepPlace {
                 stamp_s: stamp.ok_or_else(|| PyTypeError::new_err("stamp is missing"))?,
                 pose: pose.map(|value| self::pose(value, "pose")).transpose()?,
                 twist: twist.map(self::twist).transpose()?,
-            }
+            };
+            (place, &this.points)
         };
-        let py = points.py();
-        let (team, points) = (&mut this.team, &this.points);
-        let stepped = py.detach(|| team.step(&place, points.iter().copied()));
+        let (py, team) = (points.py(), &mut this.team);
+        let stepped = py.detach(|| team.step(&place, &returns[..]));
         let summary = stepped.map_err(refused)?;
         this.steps += 1;
         let number = this.steps;

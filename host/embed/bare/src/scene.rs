@@ -2,6 +2,7 @@
 //! that every machine sees the same.
 
 use raywake_core::sweep::Point;
+use raywake_embed::{ReturnSource, ReturnsBy};
 
 /// Height of the sensor above the ground, m.
 pub const HEIGHT_M: f64 = 1.7;
@@ -20,12 +21,12 @@ const BOX_MPS: f64 = 5.0;
 type Obstacle = [[f64; 2]; 3];
 
 /// Returns of the sweep at a given time, in the sensor frame.
-pub fn returns(time_s: f64) -> impl ExactSizeIterator<Item = Point> {
+pub fn returns(time_s: f64) -> impl ReturnSource {
     let sensor = [OWN_MPS * time_s, 0.0, HEIGHT_M];
     let ahead = -4.0 + BOX_MPS * time_s;
     let sliding: Obstacle = [[ahead, ahead + 3.0], [4.0, 5.6], [0.1, 1.6]];
     let standing: Obstacle = [[-1.0, 1.5], [-6.5, -5.0], [0.0, 1.4]];
-    (0..RETURNS).map(move |n| {
+    let at = move |n| {
         let (column, beam) = (n as u32 / BEAMS, n as u32 % BEAMS);
         let ray = direction(column, beam);
         let mut range = walls(&sensor, &ray);
@@ -34,7 +35,8 @@ pub fn returns(time_s: f64) -> impl ExactSizeIterator<Item = Point> {
         }
         let position = ray.map(|c| (c * range) as f32);
         Point { position, ..Point::default() }
-    })
+    };
+    ReturnsBy { count: RETURNS, at }
 }
 
 /// Direction of a ray. A revolution follows a square, which needs no sine.
