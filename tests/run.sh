@@ -128,6 +128,7 @@ static() {
     bytes=$(wc -c <"$program")
     echo "static binary for $1: $bytes bytes"
     [ "$bytes" -le 6000000 ] || { echo "larger than 6,000,000 bytes"; exit 1; }
+    ! readelf --program-headers "$program" | grep INTERP || { echo "not static"; exit 1; }
 }
 if static "$(uname -m)"; then
     others+=("$program")

@@ -49,7 +49,20 @@ after=$(find "$work/killed" -name '*.parquet' -newer "$work/task" -printf '%p %T
 
 start=$SECONDS
 seq 8 1000 | xargs -I {} "$work/task" "$work/none" "--shard={}/1001"
-echo "993 empty parts: $((SECONDS - start)) s"
+took=$((SECONDS - start))
+echo "993 empty parts: $took s"
+# Milliseconds each: nothing is read or written.
+[ "$took" -lt 60 ] || { echo "empty parts should end at once"; exit 1; }
+
+# The other commands.
+for command in track clean; do
+    for part in 0/2 1/2; do
+        "$program" $command --list "$work/list" --out "$work/$command" --shard $part --quiet
+    done
+    [ "$(find "$work/$command" -name done | wc -l)" = 8 ] ||
+        { echo "$command: not all are done"; exit 1; }
+    echo "$command: 8 recordings in 2 parts"
+done
 
 if command -v parallel >/dev/null; then
     parallel --will-cite -j 2 "$work/task" "$work/parallel" --shard={}/4 ::: 0 1 2 3
@@ -99,7 +112,7 @@ SlurmctldPidFile=$daemons/slurmctld.pid
 SlurmdPidFile=$daemons/slurmd.pid
 JobRequeue=1
 MinJobAge=3600
-NodeName=$(hostname) NodeAddr=127.0.0.1 CPUs=$cores State=UNKNOWN
+NodeName=$(hostname) NodeAddr=127.0.0.1 CPUs=$cores RealMemory=2048 State=UNKNOWN
 PartitionName=all Nodes=$(hostname) Default=YES MaxTime=INFINITE State=UP
 EOF
     export SLURM_CONF=$daemons/slurm.conf
@@ -113,8 +126,10 @@ EOF
 stop_slurm() { pkill -F "$work/slurm/slurmd.pid"; pkill -F "$work/slurm/slurmctld.pid"; } 2>/dev/null
 trap 'stop_slurm || true' EXIT
 if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
-    job=$(sbatch --parsable --array=0-3 --requeue --output="$work/slurm/%a.log" \
-        "$work/task" "$work/slurm/out")
+    mkdir "$work/bin"
+    ln -s "$program" "$work/bin/raywake"
+    job=$(PATH=$work/bin:$PATH sbatch --parsable --array=0-3 --output="$work/slurm/%a.log" \
+        examples/cluster/slurm.sh "$work/list" "$work/slurm/out")
     # One task is killed while running, with everything it runs, and requeued.
     for _ in $(seq 100); do
         squeue --noheader --states=RUNNING --job "${job}_1" | grep -q . && break

@@ -80,7 +80,7 @@ pub(crate) fn each<T: Send>(
 
 /// Calls `work` with ranges of rows and the output for them, `length` elements per row, until all
 /// are done; ranges of at most `piece_max` rows are not split further.
-pub fn share<T: Send>(
+pub(crate) fn share<T: Send>(
     workers: &dyn Workers,
     piece_max: usize,
     rows: Range<usize>,

@@ -6,6 +6,7 @@
 
 import csv
 import sys
+from pathlib import Path
 
 import numpy as np
 import ray
@@ -32,7 +33,8 @@ def label(path):
 
 def main(listed, out):
     """Labels all recordings of a list. One that fails is reported, and the others go on."""
-    paths = [line.strip() for line in open(listed) if line.strip() and line[0] != "#"]
+    lines = [line.strip() for line in Path(listed).read_text().splitlines()]
+    paths = [line for line in lines if line and line[0] != "#"]
     waiting = [label.remote(path) for path in paths]
     failed = 0
     with open(out, "w", newline="") as file:

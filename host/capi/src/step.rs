@@ -125,9 +125,6 @@ struct Column {
     stride: usize,
 }
 
-// SAFETY: the caller's numbers are only read, and it does not change them meanwhile.
-unsafe impl Sync for Column {}
-
 static ZERO: f32 = 0.0;
 
 impl Column {

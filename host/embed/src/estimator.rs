@@ -9,7 +9,7 @@ use raywake_core::pipeline::Pipeline;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Sweep};
-use raywake_core::team::{Team, share};
+use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
 use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
@@ -64,9 +64,6 @@ struct LastSweep {
     pose: Pose,
     twist: Twist,
 }
-
-/// Returns copied at a time by one thread: about 0.03 ms of work.
-const COPIED_MAX: usize = 8192;
 
 /// Returns of a sweep.
 struct SweepBuffers {
@@ -177,19 +174,28 @@ impl FlowEstimator {
         place: &SweepPlace,
         points: impl ReturnSource,
     ) -> Result<StepSummary, SweepError> {
+        self.receive(place, points)?;
+        Ok(self.advance(team, place))
+    }
+
+    /// Copies the returns of a sweep.
+    pub(crate) fn receive(
+        &mut self,
+        place: &SweepPlace,
+        points: impl ReturnSource,
+    ) -> Result<(), SweepError> {
         let count = points.count();
         self.admit(place, count)?;
         self.pair = None;
         self.sweeps.swap(0, 1);
         let now = &mut self.sweeps[0];
         now.count = count;
-        let room = &mut now.points[..count];
-        share(team, COPIED_MAX, 0..count, room, 1, &|piece, to| points.copy(piece.start, to));
-        Ok(self.advance(team, place))
+        points.copy(&mut now.points[..count]);
+        Ok(())
     }
 
     /// Does the work for the sweep received.
-    fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
+    pub(crate) fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
         let (pose, twist, pose_status) = self.locate(place);
         let [now, before] = &self.sweeps;
         let sweep =

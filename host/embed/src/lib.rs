@@ -27,4 +27,4 @@ pub use records::{ColumnRecord, NO_CLASS, ObjectRecord, PointRecord, TrackletRec
 pub use returns::{ReturnSource, ReturnsBy};
 pub use summary::{PairSummary, StepSummary};
 #[cfg(feature = "std")]
-pub use team_estimator::{StepError, TeamError, TeamEstimator};
+pub use team_estimator::{ReceivedStep, StepError, TeamError, TeamEstimator};

@@ -1,5 +1,5 @@
 //! Memory given by someone else, cut into the parts needed. This crate's unsafe code is here,
-//! except for two calls in `team_estimator`.
+//! except for one call in `team_estimator`.
 
 use core::mem::MaybeUninit;
 

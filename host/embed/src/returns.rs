@@ -2,13 +2,13 @@
 
 use raywake_core::sweep::Point;
 
-/// Returns of a sweep, in any form. They are copied, a piece at a time, by any number of threads.
-pub trait ReturnSource: Sync {
+/// Returns of a sweep, in any form.
+pub trait ReturnSource {
     /// Number of returns.
     fn count(&self) -> usize;
 
-    /// Fills `to` with the returns from the index `first` on. There are that many.
-    fn copy(&self, first: usize, to: &mut [Point]);
+    /// Copies all of them; `to` is as long as there are returns.
+    fn copy(&self, to: &mut [Point]);
 }
 
 impl<R: ReturnSource + ?Sized> ReturnSource for &R {
@@ -16,8 +16,8 @@ impl<R: ReturnSource + ?Sized> ReturnSource for &R {
         (**self).count()
     }
 
-    fn copy(&self, first: usize, to: &mut [Point]) {
-        (**self).copy(first, to);
+    fn copy(&self, to: &mut [Point]) {
+        (**self).copy(to);
     }
 }
 
@@ -26,8 +26,8 @@ impl ReturnSource for [Point] {
         self.len()
     }
 
-    fn copy(&self, first: usize, to: &mut [Point]) {
-        to.copy_from_slice(&self[first..][..to.len()]);
+    fn copy(&self, to: &mut [Point]) {
+        to.copy_from_slice(self);
     }
 }
 
@@ -39,14 +39,12 @@ pub struct ReturnsBy<F> {
     pub at: F,
 }
 
-impl<F: Fn(usize) -> Point + Sync> ReturnSource for ReturnsBy<F> {
+impl<F: Fn(usize) -> Point> ReturnSource for ReturnsBy<F> {
     fn count(&self) -> usize {
         self.count
     }
 
-    fn copy(&self, first: usize, to: &mut [Point]) {
-        for (index, to) in (first..).zip(to) {
-            *to = (self.at)(index);
-        }
+    fn copy(&self, to: &mut [Point]) {
+        to.iter_mut().enumerate().for_each(|(index, to)| *to = (self.at)(index));
     }
 }

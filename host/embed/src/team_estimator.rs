@@ -5,7 +5,6 @@
 
 use std::fmt;
 use std::io;
-use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -56,6 +55,12 @@ pub enum TeamError {
     Threads(io::Error),
 }
 
+/// A step whose returns have been copied. It is completed when this is dropped, at the latest.
+pub struct ReceivedStep<'a> {
+    team: &'a TeamEstimator,
+    rest: Option<SweepPlace>,
+}
+
 /// Where the caller and the team's leader meet.
 struct Exchange {
     work: Mutex<Work>,
@@ -71,8 +76,8 @@ struct Work {
 
 enum StepOrder {
     None,
-    /// The caller waits, and lends the returns as long.
-    Step(SweepPlace, &'static dyn ReturnSource),
+    /// The returns are in place.
+    Step(SweepPlace),
     Done(Result<StepSummary, StepError>),
     Quit,
 }
@@ -148,11 +153,21 @@ impl TeamEstimator {
         place: &SweepPlace,
         points: impl ReturnSource,
     ) -> Result<StepSummary, StepError> {
-        let mut work = self.exchange.work();
-        match self.pool {
-            None => work.step(place, &points),
-            Some(_) => self.exchange.order(work, place, &points),
-        }
+        self.receive(place, points)?.complete()
+    }
+
+    /// The first part of a step: copies the returns.
+    ///
+    /// # Errors
+    /// As for [`TeamEstimator::step`].
+    pub fn receive(
+        &mut self,
+        place: &SweepPlace,
+        points: impl ReturnSource,
+    ) -> Result<ReceivedStep<'_>, StepError> {
+        let received = self.exchange.work().contain(|e| e.receive(place, points));
+        received?.map_err(StepError::Sweep)?;
+        Ok(ReceivedStep { team: self, rest: Some(*place) })
     }
 
     /// Reads the results of the last sweep.
@@ -186,13 +201,8 @@ impl Exchange {
         &self,
         mut work: MutexGuard<Work>,
         place: &SweepPlace,
-        points: &dyn ReturnSource,
     ) -> Result<StepSummary, StepError> {
-        // SAFETY: this returns only when the step is done; the order is gone by then, and nothing
-        // else keeps the returns.
-        let lent =
-            unsafe { mem::transmute::<&dyn ReturnSource, &'static dyn ReturnSource>(points) };
-        work.order = StepOrder::Step(*place, lent);
+        work.order = StepOrder::Step(*place);
         self.changed.notify_all();
         loop {
             if let StepOrder::Done(result) = work.order {
@@ -208,8 +218,8 @@ impl Exchange {
         let mut work = self.work();
         loop {
             match work.order {
-                StepOrder::Step(place, points) => {
-                    let result = work.step(&place, points);
+                StepOrder::Step(place) => {
+                    let result = work.step(&place);
                     work.order = StepOrder::Done(result);
                     self.changed.notify_all();
                 }
@@ -221,13 +231,8 @@ impl Exchange {
 }
 
 impl Work {
-    fn step(
-        &mut self,
-        place: &SweepPlace,
-        points: &dyn ReturnSource,
-    ) -> Result<StepSummary, StepError> {
-        let team = ThreadTeam::new(None);
-        self.contain(|estimator| estimator.step(&team, place, points))?.map_err(StepError::Sweep)
+    fn step(&mut self, place: &SweepPlace) -> Result<StepSummary, StepError> {
+        self.contain(|estimator| estimator.advance(&ThreadTeam::new(None), place))
     }
 
     /// Lets nothing unwind into the caller, who may not be written in Rust. What panicked may have
@@ -239,6 +244,31 @@ impl Work {
             return contained.map_err(|_| StepError::Failed);
         }
         Err(StepError::Failed)
+    }
+}
+
+impl ReceivedStep<'_> {
+    /// Does the rest of the step.
+    ///
+    /// # Errors
+    /// This step failed.
+    pub fn complete(mut self) -> Result<StepSummary, StepError> {
+        self.rest.take().map_or(Err(StepError::Failed), |place| self.advance(&place))
+    }
+
+    fn advance(&self, place: &SweepPlace) -> Result<StepSummary, StepError> {
+        let mut work = self.team.exchange.work();
+        match self.team.pool {
+            None => work.step(place),
+            Some(_) => self.team.exchange.order(work, place),
+        }
+    }
+}
+
+impl Drop for ReceivedStep<'_> {
+    fn drop(&mut self) {
+        // A failure is reported by every later call.
+        let _ = self.rest.take().map(|place| self.advance(&place));
     }
 }
 

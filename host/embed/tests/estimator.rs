@@ -79,6 +79,28 @@ fn threads_change_nothing() {
     }
 }
 
+/// A step is completed even if nobody asks for its result.
+#[test]
+fn received_is_done() {
+    for threads in [1, 2] {
+        let teams = [false, true].map(|dropped| {
+            let mut team = TeamEstimator::new(estimator(&options()), threads).unwrap();
+            let mut digest = Digest::default();
+            for sweep in sweeps() {
+                let received = team.receive(&place(sweep), &sweep.points[..]).unwrap();
+                if dropped {
+                    drop(received);
+                } else {
+                    received.complete().unwrap();
+                }
+                team.read(|estimator| estimator.add_to(&mut digest)).unwrap();
+            }
+            digest
+        });
+        assert_eq!(teams[0], teams[1]);
+    }
+}
+
 /// Tracking objects changes nothing else, and threads change nothing about the objects.
 #[test]
 fn objects_are_followed() {

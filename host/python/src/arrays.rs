@@ -1,12 +1,15 @@
 //! Arrays of records, and reading the caller's arrays.
 
 use bytemuck::Pod;
+use std::ops::Range;
+
+use numpy::ndarray::s;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use raywake_core::sweep::Point;
-use raywake_embed::{ColumnRecord, ObjectRecord, PointRecord, TrackletRecord};
+use raywake_embed::{ColumnRecord, ObjectRecord, PointRecord, ReturnSource, TrackletRecord};
 
 use crate::flow_record::FlowRecord;
 
@@ -128,17 +131,26 @@ pub fn array<'py, R: Record>(
     bytes.call_method1("view", (dtype::<R>(py)?,))
 }
 
-/// Converts whatever NumPy can make an array of to single precision in native byte order.
-fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyAny>> {
-    let py = value.py();
-    let numpy = py.import("numpy")?;
+/// Makes an array of whatever NumPy can make one of real numbers of.
+pub fn real<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyAny>> {
+    let numpy = value.py().import("numpy")?;
+    let wrong =
+        |kind: &str| PyTypeError::new_err(format!("{what}: expected real numbers, not {kind}"));
+    if value.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
+        return Err(wrong("a masked array, whose mask would be lost"));
+    }
     let given = numpy.call_method1("asarray", (value,))?;
     let kind: String = given.getattr("dtype")?.getattr("kind")?.extract()?;
-    if !matches!(kind.as_str(), "f" | "i" | "u") {
-        let name = given.getattr("dtype")?.str()?;
-        let why = format!("{what}: expected real numbers, not {name}");
-        return Err(pyo3::exceptions::PyTypeError::new_err(why));
+    match kind.as_str() {
+        "f" | "i" | "u" => Ok(given),
+        _ => Err(wrong(&given.getattr("dtype")?.str()?.to_string())),
     }
+}
+
+/// Converts to single precision in native byte order.
+fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyAny>> {
+    let (py, given) = (value.py(), real(value, what)?);
+    let numpy = py.import("numpy")?;
     let single = numpy.getattr("float32")?;
     // A number beyond single precision becomes an infinity, which is counted as not finite.
     let quiet = PyDict::new(py);
@@ -150,39 +162,100 @@ fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyA
     made
 }
 
-/// Copies the caller's returns while no other Python thread runs.
-pub fn points(
-    to: &mut Vec<Point>,
-    points: &Bound<'_, PyAny>,
-    times: Option<&Bound<'_, PyAny>>,
-    sensors: Option<&Bound<'_, PyAny>>,
-) -> PyResult<()> {
-    let points = as_f32(points, "points")?;
-    let points: PyReadonlyArray2<f32> = points.extract().map_err(|_| shape(&points))?;
-    let [count, width] = [points.shape()[0], points.shape()[1]];
-    if width < 3 {
-        return Err(PyValueError::new_err(format!("points need at least 3 numbers, not {width}")));
+/// Returns copied at a time: the parts of columns that lie apart are gathered first.
+const BLOCK: usize = 1024;
+
+/// Returns in the caller's arrays, which are read while no other Python thread runs.
+pub struct CallerReturns<'py> {
+    positions: PyReadonlyArray2<'py, f32>,
+    times: Option<PyReadonlyArray1<'py, f32>>,
+    sensors: Option<PyReadonlyArray1<'py, f32>>,
+}
+
+impl<'py> CallerReturns<'py> {
+    /// Checks and, if need be, converts arrays.
+    pub fn new(
+        points: &Bound<'py, PyAny>,
+        times: Option<&Bound<'py, PyAny>>,
+        sensors: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<CallerReturns<'py>> {
+        let points = as_f32(points, "points")?;
+        let positions: PyReadonlyArray2<f32> = points.extract().map_err(|_| shape(&points))?;
+        let [count, width] = [positions.shape()[0], positions.shape()[1]];
+        if width < 3 {
+            let why = format!("points need at least 3 numbers, not {width}");
+            return Err(PyValueError::new_err(why));
+        }
+        let times = times.map(|times| one_each(times, "time", count)).transpose()?;
+        let sensors = sensors.map(|sensors| one_each(sensors, "sensor", count)).transpose()?;
+        Ok(CallerReturns { positions, times, sensors })
     }
-    to.clear();
-    to.reserve(count);
-    to.extend(
-        points
-            .as_array()
-            .rows()
-            .into_iter()
-            .map(|row| Point { position: [row[0], row[1], row[2]], ..Point::default() }),
-    );
-    if let Some(times) = times {
-        let times = as_f32(times, "time")?;
-        each(to, &times, "time", |point, time| point.offset_s = time)?;
+}
+
+impl ReturnSource for CallerReturns<'_> {
+    fn count(&self) -> usize {
+        self.positions.shape()[0]
     }
-    if let Some(sensors) = sensors {
-        let sensors = as_f32(sensors, "sensor")?;
-        // An invalid index stands for no sensor; it is counted.
-        let index = |v: f32| if (0.0..256.0).contains(&v) { v as u32 } else { u32::MAX };
-        each(to, &sensors, "sensor", |point, sensor| point.sensor = index(sensor))?;
+
+    fn copy(&self, to: &mut [Point]) {
+        let positions = self.positions.as_array();
+        let mut gathered = [[0.0; BLOCK]; 2];
+        let [time_room, sensor_room] = &mut gathered;
+        for (n, to) in to.chunks_mut(BLOCK).enumerate() {
+            let block = n * BLOCK..n * BLOCK + to.len();
+            let times = part(&self.times, block.clone(), time_room);
+            let sensors = part(&self.sensors, block.clone(), sensor_room);
+            let rest = times.iter().zip(sensors);
+            let positions = positions.slice(s![block, ..]);
+            match positions.to_slice() {
+                Some(flat) => {
+                    let rows = flat.chunks_exact(positions.ncols());
+                    write(to, rows.map(|row| [row[0], row[1], row[2]]).zip(rest));
+                }
+                None => {
+                    let rows = positions.rows().into_iter();
+                    write(to, rows.map(|row| [row[0], row[1], row[2]]).zip(rest));
+                }
+            }
+        }
     }
-    Ok(())
+}
+
+/// Writes positions, times and sensors.
+fn write<'a>(to: &mut [Point], values: impl Iterator<Item = ([f32; 3], (&'a f32, &'a f32))>) {
+    // An invalid index stands for no sensor; it is counted.
+    let index = |v: f32| if (0.0..256.0).contains(&v) { v as u32 } else { u32::MAX };
+    for (to, (position, (time, sensor))) in to.iter_mut().zip(values) {
+        *to = Point { position, intensity: 0.0, offset_s: *time, sensor: index(*sensor) };
+    }
+}
+
+/// Part of an array, one after the other: in the array or, if they lie apart, in `room`; zeros if
+/// there is no array.
+fn part<'a>(
+    values: &'a Option<PyReadonlyArray1<f32>>,
+    part: Range<usize>,
+    room: &'a mut [f32; BLOCK],
+) -> &'a [f32] {
+    let Some(values) = values else { return &[0.0; BLOCK][..part.len()] };
+    let values = values.as_array();
+    if let Some(flat) = values.to_slice() {
+        return &flat[part];
+    }
+    let room = &mut room[..part.len()];
+    room.iter_mut().zip(part).for_each(|(to, n)| *to = values[n]);
+    room
+}
+
+/// Copies a cloud.
+pub fn cloud(points: &Bound<'_, PyAny>) -> PyResult<Vec<Point>> {
+    let given = CallerReturns::new(points, None, None)?;
+    let (mut cloud, count) = (Vec::new(), given.count());
+    let lacking = |_| PyMemoryError::new_err(format!("no memory for {count} points"));
+    cloud.try_reserve_exact(count).map_err(lacking)?;
+    cloud.resize(count, Point::default());
+    given.copy(&mut cloud);
+    Ok(cloud)
 }
 
 fn shape(points: &Bound<'_, PyAny>) -> PyErr {
@@ -190,17 +263,12 @@ fn shape(points: &Bound<'_, PyAny>) -> PyErr {
     PyValueError::new_err(format!("points: expected an N x 3 array, not {shape}"))
 }
 
-fn each(
-    to: &mut [Point],
-    values: &Bound<'_, PyAny>,
+fn one_each<'py>(
+    values: &Bound<'py, PyAny>,
     what: &str,
-    mut set: impl FnMut(&mut Point, f32),
-) -> PyResult<()> {
+    count: usize,
+) -> PyResult<PyReadonlyArray1<'py, f32>> {
     let wrong = || PyValueError::new_err(format!("{what}: expected one number per point"));
-    let values: PyReadonlyArray1<f32> = values.extract().map_err(|_| wrong())?;
-    if values.len() != to.len() {
-        return Err(wrong());
-    }
-    to.iter_mut().zip(values.as_array()).for_each(|(point, value)| set(point, *value));
-    Ok(())
+    let values: PyReadonlyArray1<f32> = as_f32(values, what)?.extract().map_err(|_| wrong())?;
+    if values.len() == count { Ok(values) } else { Err(wrong()) }
 }

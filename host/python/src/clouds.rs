@@ -9,7 +9,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 use raywake_embed::{EstimatorOptions, SweepPlace};
 
-use crate::arrays::{self, array};
+use crate::arrays::{array, cloud};
 use crate::flow_record::FlowRecord;
 use crate::pipeline::{estimator, profile};
 use crate::poses::{matrix, pose};
@@ -65,9 +65,7 @@ pub fn flow(
         return Err(PyValueError::new_err("dt must be positive and finite"));
     }
     let profile = self::profile(profile, settings)?;
-    let [mut first, mut second] = [const { Vec::new() }; 2];
-    arrays::points(&mut first, a, None, None)?;
-    arrays::points(&mut second, b, None, None)?;
+    let [first, second] = [cloud(a)?, cloud(b)?];
     let pose = pose.map(|value| self::pose(value, "pose")).transpose()?;
     let placed = py.detach(|| place::rig(&first, ground, sensor));
     let (rig, _) = placed.map_err(|e| PyValueError::new_err(e.to_string()))?;

@@ -6,15 +6,14 @@ use pyo3::types::PyDict;
 use raywake::statistics::describe_reset;
 use raywake_core::digest::Digest;
 use raywake_core::params::{AssignError, ParameterSetting, Profile, Value};
-use raywake_core::sweep::Point;
 use raywake_embed::{
     ColumnRecord, CreateError, EstimatorOptions, FlowEstimator, ObjectRecord, PointRecord,
-    StepError, StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
+    ReceivedStep, StepError, StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
 };
 
 use raywake_registration::odometry::PoseStatus;
 
-use crate::arrays::{self, array};
+use crate::arrays::{CallerReturns, array};
 use crate::poses::{matrix, pose, twist};
 use crate::recording::PySweep;
 use crate::rig::PyRig;
@@ -33,14 +32,11 @@ use crate::rig::PyRig;
 #[pyclass(module = "raywake", name = "Pipeline")]
 pub struct PyPipeline {
     team: TeamEstimator,
-    /// Returns of the last sweep given as arrays.
-    points: Vec<Point>,
     /// Steps so far.
     steps: u64,
     digest: Digest,
     find_poses: bool,
     /// Number of bytes it works in.
-    #[pyo3(get)]
     memory: usize,
 }
 
@@ -101,8 +97,7 @@ impl PyPipeline {
         let options = EstimatorOptions { profile, rig, points_max, registers: find_poses, objects };
         let team = estimator(&options, threads)?;
         let memory = options.bytes().map_err(|e| PyValueError::new_err(e.to_string()))?;
-        let (points, digest) = (Vec::with_capacity(points_max), Digest::default());
-        Ok(PyPipeline { team, points, steps: 0, digest, find_poses, memory })
+        Ok(PyPipeline { team, steps: 0, digest: Digest::default(), find_poses, memory })
     }
 
     /// Processes one sweep; returns the results for the pair of the previous sweep and this one.
@@ -124,34 +119,34 @@ impl PyPipeline {
         time: Option<&Bound<'_, PyAny>>,
         sensor: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Step> {
-        let busy = |_| PyRuntimeError::new_err("another thread is in a step of this pipeline");
-        let mut this = slf.try_borrow_mut().map_err(busy)?;
-        let this = &mut *this;
-        let (place, returns) = if let Ok(sweep) = points.cast::<PySweep>() {
+        let mut this = slf.try_borrow_mut().map_err(|_| busy())?;
+        let (py, find_poses) = (points.py(), this.find_poses);
+        let team = &mut this.team;
+        let stepped = if let Ok(sweep) = points.cast::<PySweep>() {
             if stamp.is_some() || [pose, twist, time, sensor].iter().any(Option::is_some) {
                 return Err(PyTypeError::new_err(
                     "a Sweep already has stamp, pose, twist, time and sensor",
                 ));
             }
-            let PySweep { data, located } = sweep.get();
-            let given = *located && !this.find_poses;
+            let PySweep { data, located, .. } = sweep.get();
+            let given = *located && !find_poses;
             let place = SweepPlace {
                 stamp_s: data.stamp_s,
                 pose: given.then_some(data.world_from_vehicle),
                 twist: given.then_some(data.twist),
             };
-            (place, &data.points)
+            py.detach(|| team.step(&place, &data.points[..]))
         } else {
-            arrays::points(&mut this.points, points, time, sensor)?;
+            let returns = CallerReturns::new(points, time, sensor)?;
             let place = SweepPlace {
                 stamp_s: stamp.ok_or_else(|| PyTypeError::new_err("stamp is missing"))?,
                 pose: pose.map(|value| self::pose(value, "pose")).transpose()?,
                 twist: twist.map(self::twist).transpose()?,
             };
-            (place, &this.points)
+            // While they are copied, nobody else may change the arrays.
+            let received = team.receive(&place, &returns);
+            py.detach(|| received.and_then(ReceivedStep::complete))
         };
-        let (py, team) = (points.py(), &mut this.team);
-        let stepped = py.detach(|| team.step(&place, &returns[..]));
         let summary = stepped.map_err(refused)?;
         this.steps += 1;
         let number = this.steps;
@@ -160,17 +155,28 @@ impl PyPipeline {
 
     /// Adds everything the last step found, except objects, to the digest and returns it: called
     /// after every sweep of a recording, it gives the digest that `raywake run` prints.
-    fn update_digest(&mut self) -> PyResult<String> {
-        let digest = &mut self.digest;
-        self.team.read(|found| found.add_to(digest)).map_err(refused)?;
-        Ok(format!("{:016x}", self.digest.value()))
+    fn update_digest(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let mut this = slf.try_borrow_mut().map_err(|_| busy())?;
+        let PyPipeline { team, digest, .. } = &mut *this;
+        team.read(|found| found.add_to(digest)).map_err(refused)?;
+        Ok(format!("{:016x}", digest.value()))
     }
 
     /// Number of threads that share the work.
     #[getter]
-    fn threads(&self) -> usize {
-        self.team.threads()
+    fn threads(slf: &Bound<'_, Self>) -> PyResult<usize> {
+        Ok(slf.try_borrow().map_err(|_| busy())?.team.threads())
     }
+
+    /// Number of bytes it works in.
+    #[getter]
+    fn memory(slf: &Bound<'_, Self>) -> PyResult<usize> {
+        Ok(slf.try_borrow().map_err(|_| busy())?.memory)
+    }
+}
+
+fn busy() -> PyErr {
+    PyRuntimeError::new_err("another thread is in a step of this pipeline")
 }
 
 fn refused(e: StepError) -> PyErr {
@@ -203,7 +209,7 @@ impl Step {
         if let Some(array) = &self.arrays[which] {
             return Ok(array.clone_ref(py));
         }
-        let pipeline = self.pipeline.try_borrow(py)?;
+        let pipeline = self.pipeline.try_borrow(py).map_err(|_| busy())?;
         if pipeline.steps != self.number {
             let why = "the pipeline has gone on: read the arrays of a step before the next step";
             return Err(PyRuntimeError::new_err(why));

@@ -6,11 +6,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use raywake_core::pose::{Pose, Twist};
 
+use crate::arrays::real;
+
 /// Returns the numbers of an array of any shape, row by row.
 fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
     let numpy = value.py().import("numpy")?;
     let double = numpy.getattr("float64")?;
-    let flat = numpy.call_method1("asarray", (value, double))?.call_method0("ravel")?;
+    let flat =
+        numpy.call_method1("asarray", (real(value, what)?, double))?.call_method0("ravel")?;
     let flat: numpy::PyReadonlyArray1<f64> = flat.extract()?;
     let numbers = flat.as_array().to_vec();
     match numbers.iter().all(|v| v.is_finite()) {

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use raywake_core::sweep::Point;
 use raywake_io::Error;
 use raywake_io::source::{OpenOptions, Source, SweepData, Unlocated, open};
@@ -73,9 +74,9 @@ impl PyRecording {
         py.detach(|| {
             let poisoned = |_| PyRuntimeError::new_err("reading an earlier sweep failed");
             let mut source = self.source.lock().map_err(poisoned)?;
-            let mut sweep = SweepData::default();
+            let (mut sweep, arrays) = (SweepData::default(), [const { PyOnceLock::new() }; 4]);
             source.read(index, &mut sweep).map_err(failed)?;
-            Ok(PySweep { data: sweep, located: self.located })
+            Ok(PySweep { data: sweep, located: self.located, arrays })
         })
     }
 
@@ -96,22 +97,35 @@ impl PyRecording {
     }
 }
 
-/// A sweep of a recording.
+/// A sweep of a recording. Its arrays are made when they are first asked for, and read-only.
 #[pyclass(frozen, module = "raywake", name = "Sweep")]
 pub struct PySweep {
     /// The sweep as read.
     pub data: SweepData,
     /// Whether it has a pose.
     pub located: bool,
+    /// Of positions, intensities, times and sensors.
+    arrays: [PyOnceLock<Py<PyAny>>; 4],
 }
 
 impl PySweep {
-    fn numbers<'py, const N: usize>(
+    /// Returns an array of `N` numbers per return, made now unless it was before.
+    fn array<'py, T: numpy::Element, const N: usize>(
         &self,
         py: Python<'py>,
-        of: impl Fn(&Point) -> [f32; N],
-    ) -> Bound<'py, PyArray1<f32>> {
-        PyArray1::from_iter(py, self.data.points.iter().flat_map(of))
+        which: usize,
+        of: impl Fn(&Point) -> [T; N],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let make = || {
+            let flat = PyArray1::from_iter(py, self.data.points.iter().flat_map(of));
+            let array = match N {
+                1 => flat.into_any(),
+                _ => flat.reshape([self.data.points.len(), N])?.into_any(),
+            };
+            array.getattr("flags")?.setattr("writeable", false)?;
+            Ok::<_, PyErr>(array.unbind())
+        };
+        Ok(self.arrays[which].get_or_try_init(py, make)?.bind(py).clone())
     }
 }
 
@@ -120,26 +134,25 @@ impl PySweep {
     /// Positions of the returns in the vehicle frame, m: N x 3.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = self.numbers(py, |p| p.position);
-        Ok(flat.reshape([self.data.points.len(), 3])?.into_any())
+        self.array(py, 0, |p| p.position)
     }
 
     /// Intensity of every return, 0 to 1 if the recording has it.
     #[getter]
-    fn intensity<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        self.numbers(py, |p| [p.intensity]).into_any()
+    fn intensity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, 1, |p| [p.intensity])
     }
 
     /// Time of every return after the stamp, s.
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        self.numbers(py, |p| [p.offset_s]).into_any()
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, 2, |p| [p.offset_s])
     }
 
     /// Index of every return's sensor.
     #[getter]
-    fn sensor<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        PyArray1::from_iter(py, self.data.points.iter().map(|p| p.sensor)).into_any()
+    fn sensor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, 3, |p| [p.sensor])
     }
 
     /// Time of the sweep, s.

@@ -5,9 +5,11 @@ RAYWAKE_RECORDS=FILE, from records.c, and RAYWAKE_PROGRAM=the program.
 """
 
 import ast
+import contextlib
 import gc
 import importlib.util
 import os
+import resource
 import struct
 import subprocess
 import sys
@@ -15,6 +17,7 @@ import tempfile
 import threading
 import types
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +145,30 @@ class Same(unittest.TestCase):
             with self.subTest(name):
                 self.assertEqual(drive(kind, most=3)[0], expected)
 
+    def test_arrays_are_the_callers_again(self):
+        expected, _ = drive(most=3)
+
+        class Made:
+            """Makes an array that nobody else keeps."""
+
+            def __init__(self, xyz):
+                self.xyz = xyz
+
+            def __array__(self, dtype=None, copy=None):
+                return self.xyz.astype(dtype or "f8")
+
+        self.assertEqual(drive(Made, most=3)[0], expected)
+        pipeline = raywake.Pipeline(rig=SWEEPS.rig)
+        for stamp, pose, twist, returns in list(SWEEPS)[:3]:
+            arrays = [returns[name].copy() for name in ("xyz", "time", "sensor")]
+            xyz, time, sensor = arrays
+            pipeline.step(xyz, stamp, pose, twist=twist, time=time, sensor=sensor)
+            [array.fill(7) for array in arrays]
+            del arrays, xyz, time, sensor
+            gc.collect()
+            digest = pipeline.update_digest()
+        self.assertEqual(digest, expected)
+
     def test_records_outlive_all(self):
         pipeline = raywake.Pipeline(rig=SWEEPS.rig)
         kept = []
@@ -261,6 +288,8 @@ class Same(unittest.TestCase):
                 raywake.Pipeline(rig=recording.rig).step(last, twist=[0.0] * 6)
             self.assertEqual(last.points.tobytes(), returns["xyz"].tobytes())
             self.assertEqual((len(last), last.time.shape), (len(returns), last.intensity.shape))
+            self.assertIs(last.points, last.points)
+            self.assertFalse(last.points.flags.writeable or last.sensor.flags.writeable)
             pipeline = raywake.Pipeline(rig=recording.rig, find_poses=True)
             self.assertEqual([pipeline.step(s).reset for s in recording], ["first", None, None])
             self.assertEqual(raywake.odometry(folder).shape, (3, 4, 4))
@@ -292,6 +321,9 @@ class Refused(unittest.TestCase):
             (TypeError, "real numbers", np.zeros((2, 3), bool)),
             (TypeError, "real numbers", [["a", "b", "c"]]),
             (TypeError, "real numbers", None),
+            (TypeError, "masked", np.ma.zeros((2, 3))),
+            (ValueError, "at most", np.broadcast_to(np.float32(0), (1 << 36, 3))),
+            (ValueError, "at most", np.broadcast_to(np.float32(0), (1 << 59, 3))),
             (ValueError, "inhomogeneous|sequence", [[1, 2, 3], [4]]),
         ]
         for error, words, points in cases:
@@ -301,6 +333,7 @@ class Refused(unittest.TestCase):
     def test_what_comes_with_points(self):
         eye = np.eye(4)
         self.refuses(TypeError, "stamp", self.points)
+        self.refuses(TypeError, "pose: expected real", self.points, 0.0, eye + 0j)
         self.refuses(ValueError, "given with every", self.points, 0.0)
         self.refuses(ValueError, "finite", self.points, np.nan, eye)
         self.refuses(ValueError, "possible", self.points, 1e300, eye)
@@ -336,6 +369,8 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "weights", settings={"levels": 12}, call=make)
         self.refuses(MemoryError, "bytes", points_max=1 << 48, call=make)
         self.refuses(MemoryError, "bytes", points_max=1 << 62, call=make)
+        with address_space(4 << 30):
+            self.refuses(MemoryError, "bytes", points_max=100_000_000, call=make)
         self.refuses(ValueError, "timing", timing="x", call=raywake.Rig)
         self.refuses(ValueError, "at most 8", [np.eye(4)] * 9, call=raywake.Rig)
         self.refuses(ValueError, "rig", rig=raywake.Rig([]), call=make)
@@ -370,6 +405,30 @@ class Refused(unittest.TestCase):
         self.assertTrue(done.is_set())
         self.assertTrue(errors and all("another thread" in e for e in errors), errors)
 
+    def test_reading_during_a_step(self):
+        points = np.random.default_rng(1).normal(0, 10, (100_000, 3))
+        past = self.pipeline.step(points, 0.0, np.eye(4))
+        calls = [
+            lambda: self.pipeline.memory,
+            lambda: self.pipeline.threads,
+            lambda: self.pipeline.update_digest(),
+            lambda: past.columns,
+        ]
+        for call in calls:
+            refused = None
+            while refused is None:
+                thread = threading.Thread(
+                    target=self.pipeline.step, args=(points, 0.0, np.eye(4))
+                )
+                thread.start()
+                while thread.is_alive() and refused is None:
+                    try:
+                        call()
+                    except RuntimeError as e:
+                        refused = str(e) if "gone on" not in str(e) else None
+                thread.join()
+            self.assertIn("another thread", refused)
+
     def test_clouds_and_recordings(self):
         noise = np.random.default_rng(2).normal(0, 10, (2, 5000, 3))
         self.refuses(ValueError, "registered|ground", *noise, call=raywake.flow)
@@ -385,6 +444,17 @@ class Refused(unittest.TestCase):
         with self.assertRaises(raywake.CommandError) as caught:
             raywake.clean("/nonexistent", "/nonexistent")
         self.assertEqual(caught.exception.code, 3)
+
+
+@contextlib.contextmanager
+def address_space(bytes):
+    """Limits what the process may allocate."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (bytes, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 class Package(unittest.TestCase):
@@ -412,14 +482,58 @@ class Package(unittest.TestCase):
             self.assertEqual(said.stdout.strip(), f"raywake {raywake.__version__}")
 
 
+def load(path):
+    """Returns the module in a file, a path from the root of the source."""
+    path = Path(__file__).parents[3] / path
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def stand_in(**names):
+    """Returns a module with these names."""
+    module = types.ModuleType("stand_in")
+    vars(module).update(names)
+    return module
+
+
+class Message(types.SimpleNamespace):
+    """A message: whatever it is not given is a message."""
+
+    CUBE, UINT8, FLOAT32 = 1, 2, 7
+
+    def __getattr__(self, name):
+        setattr(self, name, Message())
+        return getattr(self, name)
+
+
+class RosNode:
+    """What the example uses of rclpy's node."""
+
+    def __init__(self, name):
+        self.published, self.warnings = [], []
+
+    def declare_parameter(self, name, default):
+        value = SWEEPS.rig.ground if name == "ground" else default
+        return types.SimpleNamespace(value=value)
+
+    def create_publisher(self, kind, topic, depth):
+        publish = lambda message: self.published.append((topic, message))
+        return types.SimpleNamespace(publish=publish)
+
+    def create_subscription(self, kind, topic, callback, qos):
+        self.callback = callback
+
+    def get_logger(self):
+        return types.SimpleNamespace(warning=self.warnings.append)
+
+
 class Node(unittest.TestCase):
     """How the example for ROS 2 handles messages."""
 
     def setUp(self):
-        path = Path(__file__).parents[1] / "examples/ros2_node.py"
-        spec = importlib.util.spec_from_file_location("ros2_node", path)
-        self.node = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(self.node)
+        self.node = load("host/python/examples/ros2_node.py")
 
     def cloud(self, returns, order="<", stamp_ns=0):
         """A cloud of two rows, with padding after each point and each row."""
@@ -477,6 +591,84 @@ class Node(unittest.TestCase):
             # In the frame of the cloud: the object's own returns lie there.
             near = np.linalg.norm(places[:, :2] - box["place"][:2], axis=1) < 3
             self.assertTrue(near.any(), box)
+
+    def test_whole_node(self):
+        nodes = []
+        ros = {
+            "rclpy": stand_in(init=lambda: None, spin=nodes.append),
+            "rclpy.node": stand_in(Node=RosNode),
+            "rclpy.qos": stand_in(qos_profile_sensor_data=None),
+            "rclpy.time": stand_in(Time=None),
+            "sensor_msgs": stand_in(),
+            "sensor_msgs.msg": stand_in(PointCloud2=Message, PointField=Message),
+            "tf2_ros": stand_in(
+                Buffer=Message, TransformException=KeyError, TransformListener=lambda *_: None
+            ),
+            "visualization_msgs": stand_in(),
+            "visualization_msgs.msg": stand_in(Marker=Message, MarkerArray=Message),
+        }
+        with unittest.mock.patch.dict(sys.modules, ros):
+            self.node.main()
+        (node,) = nodes
+        for stamp, _, _, returns in list(SWEEPS)[:8]:
+            cloud = self.cloud(returns)
+            seconds = int(stamp)
+            at = types.SimpleNamespace(sec=seconds, nanosec=round((stamp - seconds) * 1e9))
+            cloud.header = types.SimpleNamespace(stamp=at, frame_id="lidar")
+            node.callback(cloud)
+        # A cloud that is refused is skipped.
+        cloud.header.stamp.sec = 10**300
+        node.callback(cloud)
+        self.assertEqual(len(node.warnings), 1, node.warnings)
+        clouds = [message for topic, message in node.published if topic == "points_with_velocity"]
+        arrays = [message for topic, message in node.published if topic == "objects"]
+        self.assertEqual((len(clouds), len(arrays)), (7, 7))
+        points = self.node.as_array(Message(**vars(clouds[-1]), is_bigendian=False))
+        self.assertEqual(points.dtype, self.node.OUT)
+        self.assertTrue(arrays[-1].markers)
+        for marker in arrays[-1].markers:
+            turn = marker.pose.orientation
+            self.assertAlmostEqual(turn.z**2 + turn.w**2, 1)
+
+
+class Labels(unittest.TestCase):
+    def test_ray(self):
+        """The example for Ray, on one machine: a recording, and one that does not exist."""
+
+        class Failed(Exception):
+            def __init__(self, cause):
+                self.cause = cause
+
+        def remote(**resources):
+            return lambda label: types.SimpleNamespace(remote=lambda path: (label, path))
+
+        def get(task):
+            try:
+                return task[0](task[1])
+            except Exception as e:
+                raise Failed(e)
+
+        ray = stand_in(
+            remote=remote,
+            wait=lambda waiting: (waiting[:1], waiting[1:]),
+            get=get,
+            exceptions=types.SimpleNamespace(RayTaskError=Failed),
+        )
+        with unittest.mock.patch.dict(sys.modules, {"ray": ray}):
+            example = load("examples/cluster/ray_label.py")
+        with tempfile.TemporaryDirectory() as folder:
+            clouds = Path(folder, "clouds")
+            clouds.mkdir()
+            for n, (_, _, _, returns) in enumerate(list(SWEEPS)[:3]):
+                rows = np.hstack([returns["xyz"], np.zeros((len(returns), 1), "f4")])
+                Path(clouds, f"{n:06}.bin").write_bytes(rows.tobytes())
+            listed, out = Path(folder, "list"), Path(folder, "labels.csv")
+            listed.write_text(f"# two\n{clouds}\n/nonexistent\n")
+            with self.assertRaisesRegex(SystemExit, "1 of 2 recordings failed"):
+                example.main(listed, out)
+            header, *rows = out.read_text().splitlines()
+            self.assertEqual(header, "recording,stamp_s,returns,moving,fastest_mps")
+            self.assertEqual([row.split(",")[0] for row in rows], [str(clouds)] * 2)
 
 
 if __name__ == "__main__":

@@ -188,11 +188,13 @@ pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<usize, E
 
 /// A name for every drive: that of its folder.
 fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, PathBuf>, Error> {
-    let mut names = BTreeMap::new();
+    let (mut names, mut folded) = (BTreeMap::new(), BTreeMap::new());
     for path in drives {
         let full = path.canonicalize().map_err(Error::reading(path))?;
         let name = full.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if let Some(other) = names.insert(name, path.clone()) {
+        names.insert(name.clone(), path.clone());
+        // Some file systems ignore case.
+        if let Some(other) = folded.insert(name.to_lowercase(), path) {
             let what = format!("has the same name as {}", other.display());
             return Err(Error::input(path, "", what));
         }

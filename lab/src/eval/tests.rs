@@ -225,6 +225,9 @@ fn drives_that_fail_are_named() {
     let twin = folder.path().join("twin").join(good.file_name().unwrap());
     fs::create_dir_all(&twin).unwrap();
     assert!(eval(&[&good, &twin, flag, &out], &[]).unwrap_err().contains("same name"));
+    let upper = folder.path().join("UNLABELLED");
+    fs::create_dir(&upper).unwrap();
+    assert!(eval(&[&bad, &upper, flag, &out], &[]).unwrap_err().contains("same name"));
     assert!(eval(&[Path::new("/nowhere"), flag, &out], &[]).unwrap_err().contains("/nowhere"));
     assert!(eval(&[&good, flag, &out], &["--margin", "9"]).unwrap_err().contains("--margin"));
 }
