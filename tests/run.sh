@@ -241,6 +241,16 @@ if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
         usr/share/man/man1/raywake-live.1.gz; do
         [ -s "target/installed/$file" ] || { echo "$file is missing"; exit 1; }
     done
+    if command -v systemd-analyze >/dev/null; then
+        # As if it were installed. Whatever it has to say is a mistake.
+        sed "s|/usr/bin/|$PWD/target/installed/usr/bin/|" host/package/raywake.service \
+            >target/raywake.service
+        said=$(systemd-analyze verify --man=no "$PWD/target/raywake.service" 2>&1) && [ -z "$said" ] ||
+            { echo "$said"; exit 1; }
+        echo "the unit for systemd is valid"
+    else
+        echo "skipped: the unit for systemd is not checked, as systemd is not installed"
+    fi
     fresh_root "$package" || echo "skipped: a fresh Debian cannot be made here"
 else
     echo "skipped: no Debian package can be built here"

@@ -71,22 +71,26 @@ else
     echo "skipped: GNU parallel cannot be installed"
 fi
 
-# The queries of the documents, on these results. With the environment of the module for Python.
+# The code of the documents, on these results. With the environment of the module for Python.
 python=target/python/fresh/bin
-queries_of() { awk '/^```sql$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$1"; }
+code_of() { awk -v "start=\`\`\`$1" '$0 == start {inside = 1; next} /^```$/ {inside = 0} inside' "$2"; }
 if [ -x $python/pip ] &&
     $python/pip install --quiet --disable-pip-version-check duckdb==2.0.1 2>/dev/null; then
     "$lab" eval --list "$work/list" --out "$work/OUT" --rows-only >"$work/log" 2>&1 ||
         { cat "$work/log"; exit 1; }
     ln -s one "$work/results"
     for document in examples/cluster/README.md lab/README.md; do
-        queries_of $document >"$work/queries"
+        code_of sql $document >"$work/queries"
         (cd "$work" && "$OLDPWD/$python/python" -c 'import duckdb
 for query in open("queries").read().split(";")[:-1]:
     rows = duckdb.sql(query).fetchall()
     assert rows and None not in rows[0], query
     print("DuckDB:", *rows[0])')
     done
+    ln -s track "$work/tracks"
+    code_of python examples/cluster/README.md >"$work/tracks.py"
+    ! $python/python -c 'import pyarrow' 2>/dev/null ||
+        (cd "$work" && "$OLDPWD/$python/python" tracks.py)
 else
     echo "skipped: DuckDB cannot be installed"
 fi
