@@ -19,10 +19,18 @@ use crate::record::Update;
 /// Maximum number of bands remembered from sweep to sweep.
 const BANDS_MAX: usize = 256;
 
+/// Neighbouring bands are joined if they had at most this many updates together. Scenes change, and
+/// a band that no longer fits is counted in vain: in KITTI drive 0005 the updates of one change by
+/// up to 5 % from one sweep to the next.
+const JOINED_MAX: usize = BAND_UPDATES / 16 * 15;
+
+/// A band's last key plus one, and the number of its updates.
+type BandEnd = (u32, usize);
+
 /// Divides the key space into bands that fit.
 pub struct Bands {
     keys: u32,
-    ends: heapless::Vec<u32, BANDS_MAX>,
+    ends: heapless::Vec<BandEnd, BANDS_MAX>,
 }
 
 impl Bands {
@@ -30,27 +38,39 @@ impl Bands {
     pub fn new(keys: u32) -> Bands {
         let mut ends = heapless::Vec::new();
         // An empty vector has room.
-        let _ = ends.push(keys);
+        let _ = ends.push((keys, 0));
         Bands { keys, ends }
     }
 
-    /// Calls `band` with key ranges in ascending order until all keys are done. It returns whether
-    /// the range fitted; if not, the range is halved. The next sweep starts with the ranges that
-    /// fitted.
-    pub fn run<E>(&mut self, mut band: impl FnMut(u32, u32) -> Result<bool, E>) -> Result<(), E> {
+    /// Calls `band` with key ranges in ascending order until all keys are done. It returns the
+    /// number of updates in the range if they fitted; if not, the range is halved. The next sweep
+    /// starts with the ranges that fitted, of which small ones are joined.
+    pub fn run<E>(
+        &mut self,
+        mut band: impl FnMut(u32, u32) -> Result<Option<usize>, E>,
+    ) -> Result<(), E> {
         let planned = core::mem::take(&mut self.ends);
         let mut planned = planned.iter().copied();
         let (mut from, mut limit) = (0, 0);
         while from < self.keys {
             if from == limit {
-                limit = planned.next().unwrap_or(self.keys);
+                limit = planned.next().map_or(self.keys, |(end, _)| end);
             }
             let mut to = limit;
-            while !band(from, to)? {
+            let updates = loop {
+                if let Some(updates) = band(from, to)? {
+                    break updates;
+                }
                 to = from + (to - from).div_ceil(2).min(to - from - 1).max(1);
+            };
+            match self.ends.last_mut() {
+                Some((end, sum)) if *sum + updates <= JOINED_MAX => {
+                    (*end, *sum) = (to, *sum + updates);
+                }
+                // If there are more bands than there is room for, the next sweep finds the rest
+                // again.
+                _ => drop(self.ends.push((to, updates))),
             }
-            // If there are more bands than there is room for, the next sweep finds the rest again.
-            let _ = self.ends.push(to);
             from = to;
         }
         Ok(())
@@ -72,12 +92,13 @@ pub fn map(storage: &mut Storage, bands: &mut Bands, mut put: impl FnMut(&[Updat
     let done: Result<(), core::convert::Infallible> = bands.run(|from, to| {
         (storage.sweep.band_from, storage.sweep.band_to) = (from as i32, to as i32);
         run(MAP_COUNT, storage, 0, &SingleThread, quiet);
-        if storage.count_tiles[TILE] as usize > BAND_UPDATES {
-            return Ok(false);
+        let updates = storage.count_tiles[TILE] as usize;
+        if updates > BAND_UPDATES {
+            return Ok(None);
         }
         run(MAP_BAND, storage, 0, &SingleThread, quiet);
         put(&storage.scratch[..storage.run_tiles[TILE] as usize]);
-        Ok(true)
+        Ok(Some(updates))
     });
     let Ok(()) = done;
 }
@@ -120,7 +141,8 @@ mod tests {
                 if narrow(from, to) {
                     seen.push((from, to));
                 }
-                Ok(narrow(from, to))
+                // Too many to be joined.
+                Ok(narrow(from, to).then_some(JOINED_MAX))
             });
             ok.unwrap();
             assert_eq!((seen[0].0, seen[seen.len() - 1].1), (0, 1000), "round {round}");
@@ -132,9 +154,29 @@ mod tests {
         let mut count = 0;
         let ok: Result<(), ()> = bands.run(|from, to| {
             count += (to - from == 1) as u32;
-            Ok(to - from == 1)
+            Ok((to - from == 1).then_some(JOINED_MAX))
         });
         assert_eq!((ok, count), (Ok(()), 3));
+    }
+
+    #[test]
+    fn small_bands_are_joined() {
+        let mut bands = Bands::new(JOINED_MAX as u32);
+        // One update per key, four, and one again.
+        for (each, wanted) in [(1, 1), (4, 5), (1, 1)] {
+            let mut starts: Vec<u32> = Vec::new();
+            for _ in 0..3 {
+                starts.clear();
+                let ok: Result<(), ()> = bands.run(|from, to| {
+                    let updates = (to - from) as usize * each;
+                    let fits = updates <= BAND_UPDATES;
+                    starts.extend(fits.then_some(from));
+                    Ok(fits.then_some(updates))
+                });
+                ok.unwrap();
+            }
+            assert_eq!(starts.len(), wanted, "{starts:?}");
+        }
     }
 
     #[test]

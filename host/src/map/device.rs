@@ -61,13 +61,14 @@ impl DeviceMap {
             let band = SweepUniform { band_from: from as i32, band_to: to as i32, ..*sweep };
             band.write(executor.upload(uniform)?);
             executor.run(COUNT)?;
-            if executor.readback(count_tiles)[TILE] as usize > BAND_UPDATES {
-                return Ok(false);
+            let updates = executor.readback(count_tiles)[TILE] as usize;
+            if updates > BAND_UPDATES {
+                return Ok(None);
             }
             executor.run(BAND)?;
             let count = (executor.readback(run_tiles)[TILE] as usize).min(BAND_UPDATES);
             put(&bytemuck::cast_slice(executor.readback(voxels))[..count]);
-            Ok(true)
+            Ok(Some(updates))
         })
     }
 }

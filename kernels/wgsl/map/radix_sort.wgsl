@@ -2,89 +2,118 @@
 //
 // A pass: `histogram` counts the digits of every tile, a prefix sum over (digit, tile) determines
 // where each tile's share of a digit goes, `scatter` ranks the keys within the tile and writes
-// them, `next_digit` moves on. Ranks come from per-invocation counts scanned across the workgroup:
-// no subgroup size is assumed. Counts of two digits share a word, so that all fit in 8 KiB.
+// them, `next_digit` moves on. No subgroup size is assumed. What is written to workgroup memory and
+// read within control flow costs software devices time lane by lane: an invocation counts its own
+// keys in registers, and there are few barriers.
 
-const EACH = TILE / WORKGROUP;
-const HALF = RADIX / 2u;
-var<workgroup> totals: array<atomic<u32>, RADIX>;
-var<workgroup> ranks: array<u32, 2048>;
-var<workgroup> partial: array<u32, WORKGROUP>;
+const SORTERS = 64u;
+const EACH = TILE / SORTERS;
+const ROWS = RADIX / 2u;
+// Invocations per row, and the words of it that each sums.
+const ROW_SORTERS = SORTERS / ROWS;
+const SPAN = SORTERS / ROW_SORTERS;
+// Word `row * SORTERS + t` has the counts of invocation t: of the digit `row` in the low half, of
+// the digit `row + ROWS` in the high half.
+var<workgroup> counts: array<u32, 512>;
+var<workgroup> sums: array<u32, SORTERS>;
 
-fn digit_of(key: u32) -> u32 {
-    return (key >> counters.d[DIGIT_SHIFT]) & (RADIX - 1u);
+fn digit_of(key: u32, shift: u32) -> u32 {
+    return (key >> shift) & (RADIX - 1u);
 }
 
-@compute @workgroup_size(WORKGROUP)
+// One in the place of a digit: four digits share a word, a byte each.
+fn unit(digit: u32) -> vec4<u32> {
+    let one = vec4<u32>(1u << (8u * (digit % 4u)));
+    return select(vec4<u32>(), one, vec4<u32>(digit / 4u) == vec4<u32>(0u, 1u, 2u, 3u));
+}
+
+// Writes the counts of an invocation's own keys.
+fn write_counts(lane: u32, own: vec4<u32>) {
+    for (var row = 0u; row < ROWS; row += 1u) {
+        let shift = 8u * (row % 4u);
+        let low = select(own.x, own.y, row >= 4u) >> shift;
+        let high = select(own.z, own.w, row >= 4u) >> shift;
+        counts[row * SORTERS + lane] = (low & 0xffu) | ((high & 0xffu) << 16u);
+    }
+}
+
+@compute @workgroup_size(SORTERS)
 fn histogram(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if lane < RADIX {
-        atomicStore(&totals[lane], 0u);
-    }
-    workgroupBarrier();
+    let count = count_tiles.d[TILE];
+    let shift = counters.d[DIGIT_SHIFT];
+    var own = vec4<u32>();
     for (var n = 0u; n < EACH; n += 1u) {
-        let index = group.x * TILE + n * WORKGROUP + lane;
-        if index < count_tiles.d[TILE] {
-            atomicAdd(&totals[digit_of(unsorted.d[index].x)], 1u);
-        }
+        let index = group.x * TILE + n * SORTERS + lane;
+        let digit = digit_of(unsorted.d[index].x, shift);
+        own += select(vec4<u32>(), unit(digit), index < count);
     }
+    write_counts(lane, own);
     workgroupBarrier();
+    var sum = 0u;
+    for (var n = 0u; n < SPAN; n += 1u) {
+        sum += counts[lane * SPAN + n];
+    }
+    sums[lane] = sum;
+    workgroupBarrier();
+    let row = lane % ROWS;
+    var total = 0u;
+    for (var n = 0u; n < ROW_SORTERS; n += 1u) {
+        total += sums[row * ROW_SORTERS + n];
+    }
     if lane < RADIX {
-        histograms.d[lane * groups.x + group.x] = atomicLoad(&totals[lane]);
+        histograms.d[lane * groups.x + group.x] = (total >> (16u * (lane / ROWS))) & 0xffffu;
     }
 }
 
-@compute @workgroup_size(WORKGROUP)
+@compute @workgroup_size(SORTERS)
 fn scatter(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    // Digit d of invocation t is counted in word (d % 8) * 256 + t, low or high half.
-    for (var row = 0u; row < HALF; row += 1u) {
-        ranks[row * WORKGROUP + lane] = 0u;
-    }
+    let count = count_tiles.d[TILE];
+    let shift = counters.d[DIGIT_SHIFT];
     let first = group.x * TILE + lane * EACH;
-    let end = min(count_tiles.d[TILE], first + EACH);
-    for (var index = first; index < end; index += 1u) { // <= EACH
-        let digit = digit_of(unsorted.d[index].x);
-        ranks[(digit % HALF) * WORKGROUP + lane] += 1u << (16u * (digit / HALF));
+    var own = vec4<u32>();
+    for (var n = 0u; n < EACH; n += 1u) {
+        let digit = digit_of(unsorted.d[first + n].x, shift);
+        own += select(vec4<u32>(), unit(digit), first + n < count);
     }
+    write_counts(lane, own);
     workgroupBarrier();
-    // Each row of 256 words is scanned by 32 invocations, 8 words each.
+    // An exclusive prefix sum of each row.
     var sum = 0u;
-    for (var n = 0u; n < 8u; n += 1u) {
-        let count = ranks[lane * 8u + n];
-        ranks[lane * 8u + n] = sum;
-        sum += count;
+    for (var n = 0u; n < SPAN; n += 1u) {
+        sum += counts[lane * SPAN + n];
     }
-    partial[lane] = sum;
+    sums[lane] = sum;
     workgroupBarrier();
-    for (var reach = 1u; reach < 32u; reach *= 2u) { // <= 5
-        var from_left = 0u;
-        if lane % 32u >= reach {
-            from_left = partial[lane - reach];
-        }
-        workgroupBarrier();
-        partial[lane] += from_left;
-        workgroupBarrier();
+    var before = 0u;
+    for (var n = 0u; n < ROW_SORTERS - 1u; n += 1u) {
+        let other = lane - lane % ROW_SORTERS + n;
+        before += select(0u, sums[other], other < lane);
     }
-    let before = partial[lane] - sum;
-    for (var n = 0u; n < 8u; n += 1u) {
-        ranks[lane * 8u + n] += before;
+    for (var n = 0u; n < SPAN; n += 1u) {
+        let here = counts[lane * SPAN + n];
+        counts[lane * SPAN + n] = before;
+        before += here;
     }
     workgroupBarrier();
-    for (var index = first; index < end; index += 1u) { // <= EACH
-        let update = unsorted.d[index];
-        let digit = digit_of(update.x);
-        let word = (digit % HALF) * WORKGROUP + lane;
-        let half = 16u * (digit / HALF);
-        let rank = (ranks[word] >> half) & 0xffffu;
-        ranks[word] += 1u << half;
-        sorted.d[digit_offsets.d[digit * groups.x + group.x] + rank] = update;
+    own = vec4<u32>();
+    for (var n = 0u; n < EACH; n += 1u) {
+        let update = unsorted.d[first + n];
+        let digit = digit_of(update.x, shift);
+        let word = counts[(digit % ROWS) * SORTERS + lane];
+        let earlier = (dot(own, min(unit(digit), vec4<u32>(1u))) >> (8u * (digit % 4u))) & 0xffu;
+        own += unit(digit);
+        let rank = ((word >> (16u * (digit / ROWS))) & 0xffffu) + earlier;
+        let place = digit_offsets.d[digit * groups.x + group.x] + rank;
+        // What lies beyond the last update stays there.
+        sorted.d[select(first + n, place, first + n < count)] = update;
     }
 }
 
