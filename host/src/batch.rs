@@ -196,8 +196,9 @@ fn finish(
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }
-    let whole =
-        inputs::spare("out", out, data).map_err(RunError::from).and_then(|()| command.execute())?;
+    let whole = inputs::outside("out", out, data)
+        .map_err(RunError::from)
+        .and_then(|()| command.execute())?;
     if whole {
         atomic::write(&done, |to| to.write_all(seal.as_bytes()))?;
     }

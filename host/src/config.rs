@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::args::ProfileChoice;
 use raywake_io::Error;
-use raywake_io::source::whole::read_text;
+use raywake_io::source::whole::read_settings;
 
 /// The group of the tracking parameters, which has groups of its own.
 const OBJECTS: &str = "objects";
@@ -42,7 +42,7 @@ pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
 /// As [`settings`], with tracking parameters that start from these instead of the defaults.
 pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<Settings, Error> {
     let mut settings = match (&choice.config, &choice.profile) {
-        (Some(path), _) => parse(path, &read_text(path)?, objects)?,
+        (Some(path), _) => parse(path, &read_settings(path)?, objects)?,
         (None, Some(name)) => {
             let profile = Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?;
             Settings { profile, objects }

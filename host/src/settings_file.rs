@@ -14,7 +14,7 @@ use raywake_core::params::{Parameters, Profile, Value};
 use raywake_io::Error;
 use raywake_io::sink::atomic::{self, FolderClaim};
 use raywake_io::source::Overview;
-use raywake_io::source::whole::read_text;
+use raywake_io::source::whole::read_settings;
 use raywake_objects::params::TrackingParams;
 
 /// Name of the file.
@@ -54,7 +54,7 @@ impl ResultSettings<'_> {
         let claim = atomic::claim_folder(root)?;
         let (path, text) = (root.join(NAME), self.text());
         match path.is_file() {
-            true => match read_text(&path)? {
+            true => match read_settings(&path)? {
                 there if there == text => begin_again(root)?,
                 there => return Err(different(root, &there, &text)),
             },

@@ -94,6 +94,10 @@ fn many_recordings() {
     with(&["--mcap", "x.mcap"]).failed(2, &["--mcap is for a single recording"]);
     with(&["--shard", "2/2"]).failed(2, &["0 to N-1"]);
     raywake(&["run", "--list", list]).failed(2, &["--out"]);
+    let inside = drive.join("results/of/it");
+    let inside = inside.to_str().unwrap();
+    let names = ["is inside", drive.to_str().unwrap()];
+    raywake(&["run", "--list", list, "--out", inside]).failed(2, &names);
     raywake(&["run", list, "--shard", "0/2"]).failed(2, &["--list"]);
     raywake(&["run"]).failed(2, &["<DATA>"]);
     let missing = t.write("missing", "/nowhere/drive\n");

@@ -390,4 +390,10 @@ fn conflicting_arguments() {
     let capture = recorded(&t).display().to_string();
     let onto = ["--replay", &capture, "--mcap", &capture];
     wrong(&onto, 2, &["is an input"]);
+    // Three packets of it.
+    let bytes = fs::read(&capture).unwrap();
+    let length = u32::from_le_bytes(bytes[32..36].try_into().unwrap()) as usize;
+    let short = t.write("short.pcap", &bytes[..24 + 3 * (16 + length)]);
+    fs::copy(t.path().join("street.json"), t.path().join("short.json")).unwrap();
+    wrong(&["--replay", short.to_str().unwrap()], 3, &["short.pcap", "no complete sweep"]);
 }

@@ -46,19 +46,32 @@ pub fn spare(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
     })
 }
 
+/// Like [`spare`], and fails if the output is inside the input: the files there would no longer be
+/// those that the results are of.
+pub fn outside(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
+    spare(option, output, input)?;
+    if input.canonicalize().is_ok_and(|input| resolved(output).starts_with(input)) {
+        let (output, input) = (output.display(), input.display());
+        let what = format!("--{option} {output} is inside {input}: choose another path");
+        return Err(Error::Usage(what));
+    }
+    Ok(())
+}
+
 /// Names of a command's arguments that are paths.
 fn paths(command: &Command) -> impl Iterator<Item = &str> {
     let is_path = |arg: &&clap::Arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
     command.get_arguments().filter(is_path).map(|arg| arg.get_id().as_str())
 }
 
-/// The path an output would have, with links resolved.
+/// The path an output would have, with links resolved as far as it exists.
 fn resolved(output: &Path) -> PathBuf {
-    let beside = || {
-        let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
-        Some(folder.unwrap_or(Path::new(".")).canonicalize().ok()?.join(output.file_name()?))
-    };
-    output.canonicalize().ok().or_else(beside).unwrap_or_else(|| output.to_path_buf())
+    let known = output.ancestors().find_map(|part| {
+        let part = if part.as_os_str().is_empty() { Path::new(".") } else { part };
+        let rest = output.strip_prefix(part).unwrap_or(output);
+        Some(part.canonicalize().ok()?.join(rest))
+    });
+    known.unwrap_or_else(|| output.to_path_buf())
 }
 
 /// What an output does to an input, if it does harm. Results may be written inside a recording, to

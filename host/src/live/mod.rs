@@ -29,6 +29,7 @@ use std::time::{Duration, Instant};
 
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
+use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::streams::{Content, Pace, StreamTargets};
 use raywake_io::source::capture::assembly::LiveSweep;
@@ -204,10 +205,7 @@ impl Plan<'_> {
             match sweeps.fetch(into, POLL) {
                 Fetched::Value => return Ok(true),
                 Fetched::Nothing if !interrupted() => {}
-                Fetched::Nothing | Fetched::Closed => {
-                    say(self.args.quiet, "no complete sweep arrived\n")?;
-                    return Ok(false);
-                }
+                Fetched::Nothing | Fetched::Closed => break,
             }
             if !notified && began.elapsed() > PATIENCE {
                 notified = true;
@@ -219,6 +217,16 @@ impl Plan<'_> {
                     counts.foreign
                 );
                 note(self.args.quiet, &[what])?;
+            }
+        }
+        match &self.args.replay.replay {
+            // Somebody who ends it early knows.
+            Some(path) if !interrupted() => {
+                Err(Error::input(path, "", "has no complete sweep").into())
+            }
+            _ => {
+                say(self.args.quiet, "no complete sweep arrived\n")?;
+                Ok(false)
             }
         }
     }

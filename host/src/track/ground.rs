@@ -62,7 +62,7 @@ fn parse(path: &Path, content: &str) -> Result<Ground, Error> {
     }
     let (columns, rows) = (columns as usize, rows as usize);
     let nothing = find("nodata_value");
-    let mut heights = Vec::new();
+    let (mut heights, mut count) = (Vec::new(), 0);
     for (number, line) in lines {
         let row = text::numbers(path, number, line)?;
         if row.len() != columns {
@@ -70,13 +70,18 @@ fn parse(path: &Path, content: &str) -> Result<Ground, Error> {
             return Err(Error::input(path, format!("line {number}"), what));
         }
         let height = |z: f64| if Some(z) == nothing { f32::NAN } else { z as f32 };
-        heights.push(row.into_iter().map(height).collect::<Vec<_>>());
+        heights.extend(row.into_iter().map(height));
+        count += 1;
     }
-    if heights.len() != rows {
-        return Err(whole(format!("expected {rows} rows of heights, found {}", heights.len())));
+    if count != rows {
+        return Err(whole(format!("expected {rows} rows of heights, found {count}")));
     }
-    heights.reverse();
-    Ok(Ground { corner, cell_m, columns, heights: heights.concat() })
+    // The first row is the northernmost.
+    for row in 0..rows / 2 {
+        let (front, back) = heights.split_at_mut((rows - 1 - row) * columns);
+        front[row * columns..][..columns].swap_with_slice(&mut back[..columns]);
+    }
+    Ok(Ground { corner, cell_m, columns, heights })
 }
 
 #[cfg(test)]

@@ -13,6 +13,10 @@ use crate::Error;
 /// file may grow.
 pub(super) const SIZE_MAX: u64 = 256 << 20;
 
+/// Longest file of settings, or in which a sensor describes itself, bytes. The longest known, an
+/// Ouster's, has 11 KB; parsers need up to 75 bytes of memory for each of them.
+const SETTINGS_MAX: u64 = 1 << 20;
+
 /// What a packed file may unpack to: this many bytes, plus this many times its own size. Files of
 /// an Argoverse 2 log unpack to at most six times their size; zeros pack to nothing, and 16 MiB are
 /// 64 bytes for each return of the largest sweep.
@@ -81,7 +85,16 @@ pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
 
 /// The contents of a text file.
 pub fn read_text(path: &Path) -> Result<String, Error> {
-    String::from_utf8(read(path)?).map_err(|e| {
+    utf8(path, read(path)?)
+}
+
+/// The contents of a file of settings.
+pub fn read_settings(path: &Path) -> Result<String, Error> {
+    utf8(path, read_up_to(path, SETTINGS_MAX)?)
+}
+
+fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String, Error> {
+    String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         Error::input(path, format!("byte {at}"), "is not UTF-8 text")
     })
@@ -98,6 +111,9 @@ mod tests {
         let path = t.write("a", [0x61; 10]);
         assert_eq!(read_up_to(&path, 10).unwrap().len(), 10);
         assert_eq!(read_text(&path).unwrap(), "aaaaaaaaaa");
+        assert_eq!(read_settings(&path).unwrap(), "aaaaaaaaaa");
+        let long = t.write("long", vec![b'#'; SETTINGS_MAX as usize + 1]);
+        assert!(read_settings(&long).unwrap_err().to_string().contains("at most 1048576 are read"));
         let e = read_up_to(&path, 9).unwrap_err();
         assert!(e.to_string().ends_with("a: has 10 bytes or more, at most 9 are read"), "{e}");
         t.write("a", [0x61, 0xff]);

@@ -127,7 +127,8 @@ impl Ouster {
     /// Reads a sensor from its metadata file. Fails unless it has a known profile.
     pub fn read(path: &Path) -> Result<Ouster, Error> {
         let wrong = |what: String| Error::input(path, "", what);
-        let json = serde_json::from_slice(&whole::read(path)?).map_err(|e| wrong(e.to_string()))?;
+        let json =
+            serde_json::from_str(&whole::read_settings(path)?).map_err(|e| wrong(e.to_string()))?;
         Ouster::of(&Metadata(&json)).map_err(wrong)
     }
 
