@@ -67,9 +67,10 @@ fn paths(command: &Command) -> impl Iterator<Item = &str> {
 /// The path an output would have, with links resolved as far as it exists.
 fn resolved(output: &Path) -> PathBuf {
     let known = output.ancestors().find_map(|part| {
-        let part = if part.as_os_str().is_empty() { Path::new(".") } else { part };
-        let rest = output.strip_prefix(part).unwrap_or(output);
-        Some(part.canonicalize().ok()?.join(rest))
+        let here = if part.as_os_str().is_empty() { Path::new(".") } else { part };
+        // Joined one by one: an empty rest would be a slash, which a file cannot have.
+        let rest = output.strip_prefix(part).ok()?.components();
+        Some(rest.fold(here.canonicalize().ok()?, |path, name| path.join(name)))
     });
     known.unwrap_or_else(|| output.to_path_buf())
 }
