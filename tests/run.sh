@@ -128,7 +128,8 @@ static() {
     bytes=$(wc -c <"$program")
     echo "static binary for $1: $bytes bytes"
     [ "$bytes" -le 6000000 ] || { echo "larger than 6,000,000 bytes"; exit 1; }
-    ! readelf --program-headers "$program" | grep INTERP || { echo "not static"; exit 1; }
+    readelf --program-headers "$program" >target/headers.txt || exit 1
+    ! grep INTERP target/headers.txt || { echo "not static"; exit 1; }
 }
 if static "$(uname -m)"; then
     others+=("$program")
@@ -243,8 +244,8 @@ if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
     done
     if command -v systemd-analyze >/dev/null; then
         # As if it were installed. Whatever it has to say is a mistake.
-        sed "s|/usr/bin/|$PWD/target/installed/usr/bin/|" host/package/raywake.service \
-            >target/raywake.service
+        sed "s|/usr/bin/|$PWD/target/installed/usr/bin/|" \
+            target/installed/usr/lib/systemd/system/raywake.service >target/raywake.service
         said=$(systemd-analyze verify --man=no "$PWD/target/raywake.service" 2>&1) && [ -z "$said" ] ||
             { echo "$said"; exit 1; }
         echo "the unit for systemd is valid"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Many recordings on many machines: the same bytes as from one process, whatever distributes the
 # shards, even if a task is killed and requeued. `shards.sh PROGRAM LAB`; steps that need GNU
-# parallel, DuckDB or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root) are skipped
+# parallel, DuckDB, PyArrow or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root) are skipped
 # with a message if these are missing.
 set -euo pipefail
 program=$(realpath "$1")
@@ -55,13 +55,18 @@ echo "993 empty parts: $took s"
 [ "$took" -lt 60 ] || { echo "empty parts should end at once"; exit 1; }
 
 # The other commands.
+files_of() { (cd "$1" && find . -name '*.feather' -o -name '*.ply' -o -name '*.label' | sort |
+    xargs sha256sum); }
 for command in track clean; do
-    for part in 0/2 1/2; do
-        "$program" $command --list "$work/list" --out "$work/$command" --shard $part --quiet
+    for part in 0/1 0/2 1/2; do
+        "$program" $command --list "$work/list" --out "$work/$command-of-${part#*/}" \
+            --shard $part --backend scalar --quiet
     done
-    [ "$(find "$work/$command" -name done | wc -l)" = 8 ] ||
+    diff <(files_of "$work/$command-of-1") <(files_of "$work/$command-of-2") >/dev/null ||
+        { echo "$command: two parts differ from one process"; exit 1; }
+    [ "$(find "$work/$command-of-2" -name done | wc -l)" = 8 ] ||
         { echo "$command: not all are done"; exit 1; }
-    echo "$command: 8 recordings in 2 parts"
+    echo "$command: $(files_of "$work/$command-of-2" | wc -l) files, identical bytes"
 done
 
 if command -v parallel >/dev/null; then
@@ -87,10 +92,13 @@ for query in open("queries").read().split(";")[:-1]:
     assert rows and None not in rows[0], query
     print("DuckDB:", *rows[0])')
     done
-    ln -s track "$work/tracks"
+    ln -s track-of-2 "$work/tracks"
     code_of python examples/cluster/README.md >"$work/tracks.py"
-    ! $python/python -c 'import pyarrow' 2>/dev/null ||
+    if $python/python -c 'import pyarrow' 2>/dev/null; then
         (cd "$work" && "$OLDPWD/$python/python" tracks.py)
+    else
+        echo "skipped: the code for tracks, as PyArrow is not installed"
+    fi
 else
     echo "skipped: DuckDB cannot be installed"
 fi

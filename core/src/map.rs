@@ -63,12 +63,12 @@ impl Bands {
                 }
                 to = from + (to - from).div_ceil(2).min(to - from - 1).max(1);
             };
+            // If there is no room for more bands, the next sweep divides the last again.
+            let full = self.ends.is_full();
             match self.ends.last_mut() {
-                Some((end, sum)) if *sum + updates <= JOINED_MAX => {
+                Some((end, sum)) if full || *sum + updates <= JOINED_MAX => {
                     (*end, *sum) = (to, *sum + updates);
                 }
-                // If there are more bands than there is room for, the next sweep finds the rest
-                // again.
                 _ => drop(self.ends.push((to, updates))),
             }
             from = to;

@@ -109,6 +109,10 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     }
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
     let (mine, line) = part(list, shard)?;
+    if let Some(out) = command.out() {
+        let all = listed(list)?;
+        all.iter().try_for_each(|recording| inputs::outside("out", out, &recording.data))?;
+    }
     let seal = seal(command)?;
     say(quiet, &line)?;
     let mut tally = Tally::default();
@@ -196,9 +200,8 @@ fn finish(
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }
-    let whole = inputs::outside("out", out, data)
-        .map_err(RunError::from)
-        .and_then(|()| command.execute())?;
+    let whole =
+        inputs::spare("out", out, data).map_err(RunError::from).and_then(|()| command.execute())?;
     if whole {
         atomic::write(&done, |to| to.write_all(seal.as_bytes()))?;
     }

@@ -94,10 +94,15 @@ fn many_recordings() {
     with(&["--mcap", "x.mcap"]).failed(2, &["--mcap is for a single recording"]);
     with(&["--shard", "2/2"]).failed(2, &["0 to N-1"]);
     raywake(&["run", "--list", list]).failed(2, &["--out"]);
-    let inside = drive.join("results/of/it");
-    let inside = inside.to_str().unwrap();
-    let names = ["is inside", drive.to_str().unwrap()];
-    raywake(&["run", "--list", list, "--out", inside]).failed(2, &names);
+    // Inside the second one: nothing is done, not even for the first.
+    let second = t.path().join("second");
+    std::fs::create_dir(&second).unwrap();
+    let two = t.write("two", format!("{}\n{}\n", drive.display(), second.display()));
+    let inside = second.join("results/of/it");
+    let [two, inside] = [&two, &inside].map(|path| path.to_str().unwrap());
+    let names = ["is inside", second.to_str().unwrap()];
+    raywake(&["run", "--list", two, "--out", inside]).failed(2, &names);
+    assert!(!second.join("results").exists());
     raywake(&["run", list, "--shard", "0/2"]).failed(2, &["--list"]);
     raywake(&["run"]).failed(2, &["<DATA>"]);
     let missing = t.write("missing", "/nowhere/drive\n");

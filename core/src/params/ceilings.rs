@@ -63,10 +63,10 @@ pub const CLOUD_MAX: usize = 65_535;
 pub const SIGHTLINES_MAX: usize = 65_536;
 /// Updates (voxel, log-odds) of one band of the sparse map.
 pub const BAND_UPDATES: usize = 1 << 20;
-/// Threads per workgroup of every one-dimensional kernel.
+/// Threads per workgroup of most one-dimensional kernels.
 pub const WORKGROUP: usize = 256;
-/// Threads per workgroup if each handles a ray or a foreground column, or all of them one
-/// column.
+/// Threads per workgroup if each handles a ray, a foreground column or several keys of the radix
+/// sort, or all of them one column.
 pub const ROW_WORKGROUP: usize = 64;
 /// Items that a workgroup of the prefix sum or of the radix sort handles.
 pub const TILE: usize = 1024;

@@ -13,8 +13,8 @@ crate::params! {
     pub struct MovesParams {
         /// Minimum P(moves) of anything reported as moving.
         pub moves_min: f32 = 0.4, "", (0 to 1),
-            "For drives; `raywake flow`, which has no history, starts from 0.2. The smallest of \
-             0.3, 0.4 and 0.5 at which fewer than one in 2,000 returns of a \
+            "For drives; `raywake flow` and Python's `flow`, without history, have 0.2. The \
+             smallest of 0.3, 0.4 and 0.5 at which fewer than one in 2,000 returns of a \
              static simulated street are reported as moving. Precision and recall of columns on \
              simulated streets of another seed than the weights (as for `could_move_min`; slow and \
              plain, `vlp32x2`): 95.4 and 91.1, 96.2 and 97.5 % at 0.3; 95.8 and 90.3, 96.4 and \

@@ -35,7 +35,7 @@ impl ReturnSource for [Point] {
 pub struct ReturnsBy<F> {
     /// Number of returns.
     pub count: usize,
-    /// Returns the one with this index, which is less than `count`.
+    /// The return with this index, which is less than `count`.
     pub at: F,
 }
 

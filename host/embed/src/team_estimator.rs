@@ -56,6 +56,7 @@ pub enum TeamError {
 }
 
 /// A step whose returns have been copied. It is completed when this is dropped, at the latest.
+#[must_use = "dropping it does the rest of the step, and loses its result"]
 pub struct ReceivedStep<'a> {
     team: &'a TeamEstimator,
     rest: Option<SweepPlace>,
@@ -253,6 +254,7 @@ impl ReceivedStep<'_> {
     /// # Errors
     /// This step failed.
     pub fn complete(mut self) -> Result<StepSummary, StepError> {
+        // Nothing takes it but this and the drop after it.
         self.rest.take().map_or(Err(StepError::Failed), |place| self.advance(&place))
     }
 

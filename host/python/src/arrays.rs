@@ -1,8 +1,8 @@
 //! Arrays of records, and reading the caller's arrays.
 
-use bytemuck::Pod;
 use std::ops::Range;
 
+use bytemuck::Pod;
 use numpy::ndarray::s;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
@@ -162,7 +162,7 @@ fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyA
     made
 }
 
-/// Returns copied at a time: the parts of columns that lie apart are gathered first.
+/// Returns copied at a time; columns with gaps between their elements are gathered first.
 const BLOCK: usize = 1024;
 
 /// Returns in the caller's arrays, which are read while no other Python thread runs.
@@ -230,20 +230,20 @@ fn write<'a>(to: &mut [Point], values: impl Iterator<Item = ([f32; 3], (&'a f32,
     }
 }
 
-/// Part of an array, one after the other: in the array or, if they lie apart, in `room`; zeros if
+/// Some elements of an array, contiguous: where they are or, if there are gaps, in `room`; zeros if
 /// there is no array.
 fn part<'a>(
     values: &'a Option<PyReadonlyArray1<f32>>,
-    part: Range<usize>,
+    which: Range<usize>,
     room: &'a mut [f32; BLOCK],
 ) -> &'a [f32] {
-    let Some(values) = values else { return &[0.0; BLOCK][..part.len()] };
+    let Some(values) = values else { return &[0.0; BLOCK][..which.len()] };
     let values = values.as_array();
     if let Some(flat) = values.to_slice() {
-        return &flat[part];
+        return &flat[which];
     }
-    let room = &mut room[..part.len()];
-    room.iter_mut().zip(part).for_each(|(to, n)| *to = values[n]);
+    let room = &mut room[..which.len()];
+    room.iter_mut().zip(which).for_each(|(to, n)| *to = values[n]);
     room
 }
 

@@ -97,7 +97,8 @@ impl PyRecording {
     }
 }
 
-/// A sweep of a recording. Its arrays are made when they are first asked for, and read-only.
+/// A sweep of a recording. Its arrays are made when they are first asked for, and kept: they are
+/// read-only, and must not be made writeable.
 #[pyclass(frozen, module = "raywake", name = "Sweep")]
 pub struct PySweep {
     /// The sweep as read.

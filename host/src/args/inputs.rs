@@ -1,7 +1,7 @@
 //! Protection of inputs from being overwritten by outputs.
 
 use std::any::TypeId;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use clap::{ArgMatches, Command, CommandFactory};
 use raywake_io::Error;
@@ -46,10 +46,9 @@ pub fn spare(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
     })
 }
 
-/// Like [`spare`], and fails if the output is inside the input: the files there would no longer be
-/// those that the results are of.
+/// Fails if the output is inside the input: results would count as files of the recording, which
+/// would never be done.
 pub fn outside(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
-    spare(option, output, input)?;
     if input.canonicalize().is_ok_and(|input| resolved(output).starts_with(input)) {
         let (output, input) = (output.display(), input.display());
         let what = format!("--{option} {output} is inside {input}: choose another path");
@@ -68,9 +67,15 @@ fn paths(command: &Command) -> impl Iterator<Item = &str> {
 fn resolved(output: &Path) -> PathBuf {
     let known = output.ancestors().find_map(|part| {
         let here = if part.as_os_str().is_empty() { Path::new(".") } else { part };
-        // Joined one by one: an empty rest would be a slash, which a file cannot have.
-        let rest = output.strip_prefix(part).ok()?.components();
-        Some(rest.fold(here.canonicalize().ok()?, |path, name| path.join(name)))
+        let mut path = here.canonicalize().ok()?;
+        // Not joined at once: joining an empty path would append a slash.
+        for name in output.strip_prefix(part).ok()?.components() {
+            match name {
+                Component::ParentDir => drop(path.pop()),
+                name => path.push(name),
+            }
+        }
+        Some(path)
     });
     known.unwrap_or_else(|| output.to_path_buf())
 }
@@ -97,6 +102,20 @@ fn harm(output: &Path, input: &Path) -> Option<&'static str> {
 mod tests {
     use super::*;
     use std::collections::BTreeSet;
+
+    #[test]
+    fn outputs_that_do_not_exist_yet() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("drive");
+        std::fs::create_dir(&input).unwrap();
+        let place = |path: &str| folder.path().join(path);
+        for inside in ["drive", "drive/a/b", "new/../drive/a", "new/a/../../drive/./a"] {
+            assert!(outside("out", &place(inside), &input).is_err(), "{inside}");
+        }
+        for apart in ["", "new", "drives/a", "drive/../a", "new/../a/drive"] {
+            assert!(outside("out", &place(apart), &input).is_ok(), "{apart}");
+        }
+    }
 
     #[test]
     fn every_path_is_known_as_read_or_written() {

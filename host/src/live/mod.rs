@@ -117,7 +117,8 @@ pub fn live(args: &LiveArgs) -> Result<(), RunError> {
         let result = plan.work(&receiver, &sweeps, poses.as_ref());
         stop.store(true, Ordering::Relaxed);
         let sent = replaying.map(|thread| thread.join().expect("a replay does not panic"));
-        result.and(sent.transpose().map(|_| ()).map_err(RunError::from))
+        // If a replay could not be sent, that is why no sweep came.
+        sent.transpose().map_err(RunError::from).and(result)
     })
 }
 
@@ -193,7 +194,8 @@ impl Plan<'_> {
         LiveObjects::new(self.tracking, &self.profile).map(Some)
     }
 
-    /// Waits for the first sweep. Returns whether one arrived: a signal may come first.
+    /// Waits for the first sweep. Returns whether one arrived: a signal may come first. Fails if a
+    /// replay ends without one.
     fn first_sweep(
         &self,
         receiver: &Receiver,

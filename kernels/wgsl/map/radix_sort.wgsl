@@ -6,15 +6,17 @@
 // read within control flow costs software devices time lane by lane: an invocation counts its own
 // keys in registers, and there are few barriers.
 
-const SORTERS = 64u;
+const SORTERS = ROW_WORKGROUP;
 const EACH = TILE / SORTERS;
+// A byte holds the count of each digit, and four words have four each.
+const_assert EACH < 256u && RADIX == 16u;
 const ROWS = RADIX / 2u;
 // Invocations per row, and the words of it that each sums.
 const ROW_SORTERS = SORTERS / ROWS;
 const SPAN = SORTERS / ROW_SORTERS;
 // Word `row * SORTERS + t` has the counts of invocation t: of the digit `row` in the low half, of
 // the digit `row + ROWS` in the high half.
-var<workgroup> counts: array<u32, 512>;
+var<workgroup> counts: array<u32, ROWS * SORTERS>;
 var<workgroup> sums: array<u32, SORTERS>;
 
 fn digit_of(key: u32, shift: u32) -> u32 {

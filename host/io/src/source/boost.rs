@@ -20,7 +20,7 @@ const ATTRIBUTES_MAX: usize = 100;
 /// its size: text defined once and inserted many times, and attributes and namespaces, each of
 /// which is compared with those before it. Or what `each` returns.
 pub fn read<T>(path: &Path, each: impl FnOnce(&Document) -> Result<T, Error>) -> Result<T, Error> {
-    let text = whole::read_text(path)?;
+    let text = whole::read_settings(path)?;
     check_size(&text).map_err(|what| Error::input(path, "", what))?;
     let options =
         ParsingOptions { allow_dtd: true, nodes_limit: NODES_MAX, ..ParsingOptions::default() };

@@ -13,8 +13,8 @@ use crate::Error;
 /// file may grow.
 pub(super) const SIZE_MAX: u64 = 256 << 20;
 
-/// Longest file of settings, or in which a sensor describes itself, bytes. The longest known, an
-/// Ouster's, has 11 KB; parsers need up to 75 bytes of memory for each of them.
+/// Longest file of settings, or of a sensor's metadata, bytes. An Ouster's has 7 to 11 KB
+/// (`tests/packets`); the TOML parser needs up to 75 bytes of memory for each byte of the file.
 const SETTINGS_MAX: u64 = 1 << 20;
 
 /// What a packed file may unpack to: this many bytes, plus this many times its own size. Files of

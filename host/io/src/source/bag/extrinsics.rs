@@ -17,7 +17,7 @@ use crate::source::{text, whole};
 /// # Errors
 /// With the line if it is not such a link, or if nothing is in the child frame.
 pub(super) fn add(path: &Path, contents: &mut Contents) -> Result<(), Error> {
-    let content = whole::read_text(path)?;
+    let content = whole::read_settings(path)?;
     for (number, line) in text::lines(&content) {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
