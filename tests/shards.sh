@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Many recordings on many machines: the same bytes as from one process, whatever distributes the
 # shards, even if a task is killed and requeued. `shards.sh PROGRAM LAB`; steps that need GNU
-# parallel, DuckDB, PyArrow or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root) are skipped
-# with a message if these are missing.
+# parallel, DuckDB, PyArrow or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root)
+# are skipped with a message if these are missing.
 set -euo pipefail
 program=$(realpath "$1")
 lab=$(realpath "$2")
@@ -21,18 +21,22 @@ EOF
 chmod +x "$work/task"
 
 # Times differ between runs, and so do the files that contain them.
-bytes_of() { (cd "$1" && find . -name '*.parquet' -exec sha256sum {} + | sort -k 2); }
+bytes_of() {
+    (cd "$1" && find . \( -name '*.parquet' -o -name '*.feather' -o -name '*.ply' -o \
+        -name '*.label' \) -exec sha256sum {} + | sort -k 2)
+}
+# `compare RESULTS [OTHERS]`: with those of one process.
 compare() {
-    local found
+    local found expected
     found=$(bytes_of "$work/$1")
+    expected=$(bytes_of "$work/${2:-one}")
     [ "$found" = "$expected" ] || { diff <(echo "$expected") <(echo "$found"); exit 1; }
     [ "$(find "$work/$1" -name done | wc -l)" = 8 ] || { echo "$1: not all are done"; exit 1; }
-    echo "$1: identical bytes"
+    echo "$1: $(wc -l <<<"$found") files, identical bytes"
 }
 
 "$work/task" "$work/one"
-expected=$(bytes_of "$work/one")
-[ "$(wc -l <<<"$expected")" = 24 ] || { echo "24 tables should have been written"; exit 1; }
+[ "$(bytes_of "$work/one" | wc -l)" = 24 ] || { echo "24 tables should have been written"; exit 1; }
 
 # Killed at arbitrary points, and started again.
 for delay in 0.2 0.5 0.9; do
@@ -55,18 +59,12 @@ echo "993 empty parts: $took s"
 [ "$took" -lt 60 ] || { echo "empty parts should end at once"; exit 1; }
 
 # The other commands.
-files_of() { (cd "$1" && find . -name '*.feather' -o -name '*.ply' -o -name '*.label' | sort |
-    xargs sha256sum); }
 for command in track clean; do
     for part in 0/1 0/2 1/2; do
         "$program" $command --list "$work/list" --out "$work/$command-of-${part#*/}" \
             --shard $part --backend scalar --quiet
     done
-    diff <(files_of "$work/$command-of-1") <(files_of "$work/$command-of-2") >/dev/null ||
-        { echo "$command: two parts differ from one process"; exit 1; }
-    [ "$(find "$work/$command-of-2" -name done | wc -l)" = 8 ] ||
-        { echo "$command: not all are done"; exit 1; }
-    echo "$command: $(files_of "$work/$command-of-2" | wc -l) files, identical bytes"
+    compare $command-of-2 $command-of-1
 done
 
 if command -v parallel >/dev/null; then

@@ -21,7 +21,7 @@ const BANDS_MAX: usize = 256;
 
 /// Neighbouring bands are joined if they had at most this many updates together. Scenes change, and
 /// a band that no longer fits is counted in vain: in KITTI drive 0005 the updates of one change by
-/// up to 5 % from one sweep to the next.
+/// up to 7 % from one sweep to the next.
 const JOINED_MAX: usize = BAND_UPDATES / 16 * 15;
 
 /// A band's last key plus one, and the number of its updates.

@@ -108,11 +108,11 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
         return Err(Error::Usage(what).into());
     }
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
-    let (mine, line) = part(list, shard)?;
+    let all = listed(list)?;
     if let Some(out) = command.out() {
-        let all = listed(list)?;
         all.iter().try_for_each(|recording| inputs::outside("out", out, &recording.data))?;
     }
+    let (mine, line) = shared(all, shard);
     let seal = seal(command)?;
     say(quiet, &line)?;
     let mut tally = Tally::default();
@@ -136,12 +136,14 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
 /// # Errors
 /// A path in the list does not exist, or the results of two recordings would collide.
 pub fn part(list: &Path, shard: Shard) -> Result<(Vec<ListedRecording>, String), Error> {
-    let Shard { index, of } = shard;
-    let all = listed(list)?;
-    let count = all.len();
+    Ok(shared(listed(list)?, shard))
+}
+
+fn shared(all: Vec<ListedRecording>, shard: Shard) -> (Vec<ListedRecording>, String) {
+    let (Shard { index, of }, count) = (shard, all.len());
     let mine: Vec<_> = all.into_iter().skip(index).step_by(of).collect();
     let line = format!("part {index} of {of}: {} of {count} recordings\n", mine.len());
-    Ok((mine, line))
+    (mine, line)
 }
 
 impl Tally {

@@ -124,7 +124,7 @@ fn embedded(threads: usize, sweeps: &[SimSweep]) {
             }
         }
     }
-    let title = format!("libraries, profile hdl64, {threads} threads, ms a sweep");
+    let title = format!("libraries, profile hdl64, threads: {threads}, ms a sweep");
     table(&title, &variants, &[(1, 0)], &[(0, 1)]);
 }
 

@@ -13,7 +13,7 @@ crate::params! {
     pub struct MovesParams {
         /// Minimum P(moves) of anything reported as moving.
         pub moves_min: f32 = 0.4, "", (0 to 1),
-            "For drives; `raywake flow` and Python's `flow`, without history, have 0.2. The \
+            "For drives: a pair of clouds, without history, has a default of its own. The \
              smallest of 0.3, 0.4 and 0.5 at which fewer than one in 2,000 returns of a \
              static simulated street are reported as moving. Precision and recall of columns on \
              simulated streets of another seed than the weights (as for `could_move_min`; slow and \

@@ -5,11 +5,9 @@ RAYWAKE_RECORDS=FILE, from records.c, and RAYWAKE_PROGRAM=the program.
 """
 
 import ast
-import contextlib
 import gc
 import importlib.util
 import os
-import resource
 import struct
 import subprocess
 import sys
@@ -375,8 +373,6 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "weights", settings={"levels": 12}, call=make)
         self.refuses(MemoryError, "bytes", points_max=1 << 48, call=make)
         self.refuses(MemoryError, "bytes", points_max=1 << 62, call=make)
-        with address_space(4 << 30):
-            self.refuses(MemoryError, "bytes", points_max=100_000_000, call=make)
         self.refuses(ValueError, "timing", timing="x", call=raywake.Rig)
         self.refuses(ValueError, "at most 8", [np.eye(4)] * 9, call=raywake.Rig)
         self.refuses(ValueError, "rig", rig=raywake.Rig([]), call=make)
@@ -453,17 +449,6 @@ class Refused(unittest.TestCase):
         with self.assertRaises(raywake.CommandError) as caught:
             raywake.clean("/nonexistent", "/nonexistent")
         self.assertEqual(caught.exception.code, 3)
-
-
-@contextlib.contextmanager
-def address_space(size):
-    """Limits what the process may allocate."""
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 class Package(unittest.TestCase):

@@ -15,8 +15,7 @@ Scene flow from cloud A to cloud B; no poses needed
 The motion of the sensor is estimated by registration, then both clouds are processed as two \
 sweeps of a drive. Clouds are scans of a spinning sensor, with z up, in the frame of the sensor or \
 the vehicle: .bin (float32 x, y, z, intensity), .npy, .pcd, .ply or .feather (columns x, y, z); A \
-and B may differ in format. Times of individual returns are ignored. What moves is decided without \
-history: unless chosen (--moving), at P(moves) of 0.2 instead of 0.4.";
+and B may differ in format. Times of individual returns are ignored.";
 
 const FILES: &str = "\
 Columns of --out FILE.feather, one row per point of A in file order, including invalid points:

@@ -207,4 +207,13 @@ mod tests {
         let moving = args::ProfileChoice { moving: Some(0.4), ..choice };
         assert_eq!(profile(&moving).unwrap().moves.moves_min, 0.4);
     }
+
+    #[test]
+    fn help_says_which() {
+        let mut program = <args::Args as clap::CommandFactory>::command();
+        let flow = program.find_subcommand_mut("flow").unwrap();
+        let help = flow.render_long_help().to_string();
+        let said = format!("default: {}, and {PAIR_MOVES_MIN}", Profile::hdl64().moves.moves_min);
+        assert!(help.contains(&said), "{help}");
+    }
 }

@@ -29,14 +29,21 @@ fn unit(digit: u32) -> vec4<u32> {
     return select(vec4<u32>(), one, vec4<u32>(digit / 4u) == vec4<u32>(0u, 1u, 2u, 3u));
 }
 
-// Writes the counts of an invocation's own keys.
-fn write_counts(lane: u32, own: vec4<u32>) {
+// Shares the counts of an invocation's own keys, and sums a span of a row.
+fn share_counts(lane: u32, own: vec4<u32>) {
     for (var row = 0u; row < ROWS; row += 1u) {
         let shift = 8u * (row % 4u);
         let low = select(own.x, own.y, row >= 4u) >> shift;
         let high = select(own.z, own.w, row >= 4u) >> shift;
         counts[row * SORTERS + lane] = (low & 0xffu) | ((high & 0xffu) << 16u);
     }
+    workgroupBarrier();
+    var sum = 0u;
+    for (var n = 0u; n < SPAN; n += 1u) {
+        sum += counts[lane * SPAN + n];
+    }
+    sums[lane] = sum;
+    workgroupBarrier();
 }
 
 @compute @workgroup_size(SORTERS)
@@ -53,14 +60,7 @@ fn histogram(
         let digit = digit_of(unsorted.d[index].x, shift);
         own += select(vec4<u32>(), unit(digit), index < count);
     }
-    write_counts(lane, own);
-    workgroupBarrier();
-    var sum = 0u;
-    for (var n = 0u; n < SPAN; n += 1u) {
-        sum += counts[lane * SPAN + n];
-    }
-    sums[lane] = sum;
-    workgroupBarrier();
+    share_counts(lane, own);
     let row = lane % ROWS;
     var total = 0u;
     for (var n = 0u; n < ROW_SORTERS; n += 1u) {
@@ -85,15 +85,8 @@ fn scatter(
         let digit = digit_of(unsorted.d[first + n].x, shift);
         own += select(vec4<u32>(), unit(digit), first + n < count);
     }
-    write_counts(lane, own);
-    workgroupBarrier();
+    share_counts(lane, own);
     // An exclusive prefix sum of each row.
-    var sum = 0u;
-    for (var n = 0u; n < SPAN; n += 1u) {
-        sum += counts[lane * SPAN + n];
-    }
-    sums[lane] = sum;
-    workgroupBarrier();
     var before = 0u;
     for (var n = 0u; n < ROW_SORTERS - 1u; n += 1u) {
         let other = lane - lane % ROW_SORTERS + n;
