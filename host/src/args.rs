@@ -211,8 +211,7 @@ pub struct ProfileChoice {
     /// Custom profile (TOML): `base = "hdl64"` and the parameters to change
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Report as moving what moves with at least this probability (`moves_min` in PARAMETERS.md);
-    /// default: 0.4, and 0.2 for `flow`, which has no history
+    /// Report as moving what moves with at least this probability (`moves_min` in PARAMETERS.md)
     #[arg(long, value_name = "P")]
     pub moving: Option<f32>,
     /// Set a parameter of the profile, as named in PARAMETERS.md; may be repeated

@@ -36,25 +36,18 @@ pub fn profile(choice: &ProfileChoice) -> Result<Profile, Error> {
 
 /// As [`profile`], with the tracking parameters.
 pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
-    settings_over(choice, |_| ())
+    settings_over(choice, TrackingParams::DEFAULT)
 }
 
-/// As [`settings`], with other defaults.
-pub fn settings_over(
-    choice: &ProfileChoice,
-    defaults: impl Fn(&mut Settings),
-) -> Result<Settings, Error> {
-    let base = |name: &str| {
-        let mut settings = named(name)?;
-        defaults(&mut settings);
-        Some(settings)
-    };
-    let mut settings = match &choice.config {
-        Some(path) => parse(path, &read_settings(path)?, base)?,
-        None => {
-            let name = choice.profile.as_deref().unwrap_or("hdl64");
-            base(name).ok_or_else(|| Error::Usage(no_profile(name)))?
+/// As [`settings`], with tracking parameters that start from these instead of the defaults.
+pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<Settings, Error> {
+    let mut settings = match (&choice.config, &choice.profile) {
+        (Some(path), _) => parse(path, &read_settings(path)?, objects)?,
+        (None, Some(name)) => {
+            let profile = Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?;
+            Settings { profile, objects }
         }
+        (None, None) => Settings { profile: Profile::hdl64(), objects },
     };
     for assignment in &choice.set {
         assign(&mut settings, assignment)
@@ -68,11 +61,6 @@ pub fn settings_over(
         |e: ProfileError| Error::Usage(format!("--set: `{}` must be {}", e.field, e.requirement));
     settings.check().map_err(rule)?;
     Ok(settings)
-}
-
-/// The settings of a built-in profile.
-fn named(name: &str) -> Option<Settings> {
-    Some(Settings { profile: Profile::named(name)?, objects: TrackingParams::DEFAULT })
 }
 
 fn no_profile(name: &str) -> String {
@@ -121,11 +109,7 @@ fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Res
     }
 }
 
-fn parse(
-    path: &Path,
-    text: &str,
-    base_of: impl Fn(&str) -> Option<Settings>,
-) -> Result<Settings, Error> {
+fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, Error> {
     let line = |at: usize| format!("line {}", text[..at.min(text.len())].matches('\n').count() + 1);
     let table = DeTable::parse(text).map_err(|e| {
         let place = e.span().map_or(String::new(), |s| line(s.start));
@@ -138,8 +122,9 @@ fn parse(
         Some(_) => Err(Error::input(path, format!("key `{key}`"), "must be a string")),
     };
     let base = word("base", "hdl64")?;
-    let mut settings =
-        base_of(base).ok_or_else(|| Error::input(path, "key `base`", no_profile(base)))?;
+    let profile =
+        Profile::named(base).ok_or_else(|| Error::input(path, "key `base`", no_profile(base)))?;
+    let mut settings = Settings { profile, objects };
     settings.profile.name = word("name", "custom")?
         .parse()
         .map_err(|_| Error::input(path, "key `name`", "must be at most 24 bytes long"))?;
@@ -193,10 +178,12 @@ mod tests {
     use raywake_core::params::{Birth, Frame};
 
     fn parsed(text: &str) -> Result<Profile, String> {
-        parse(Path::new("p.toml"), text, named).map(|settings| settings.profile).map_err(|e| {
-            assert_eq!(e.exit_code(), 3);
-            e.to_string()
-        })
+        parse(Path::new("p.toml"), text, TrackingParams::DEFAULT)
+            .map(|settings| settings.profile)
+            .map_err(|e| {
+                assert_eq!(e.exit_code(), 3);
+                e.to_string()
+            })
     }
 
     #[test]
@@ -255,29 +242,6 @@ mod tests {
             [tracklet]\ngate_d2 = 5.0\nbirth = \"source\"\n[objects]\npatience_s = 0.6\n";
         let checked = |profile: Profile| assert_eq!(profile.check(), Ok(()));
         crate::damaged::check(text, 5000, |text| parsed(text).map(checked).is_ok());
-    }
-
-    #[test]
-    fn other_defaults_give_way_to_what_is_chosen() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = |name: &str, text: &str| {
-            let path = folder.path().join(name);
-            std::fs::write(&path, text).unwrap();
-            Some(path)
-        };
-        let moves_min = |choice: ProfileChoice| {
-            let settings = settings_over(&choice, |s| s.profile.moves.moves_min = 0.2).unwrap();
-            settings.profile.moves.moves_min
-        };
-        let other = ProfileChoice { profile: Some("wide".into()), ..Default::default() };
-        let set = ProfileChoice { set: vec!["moves_min=0.4".into()], ..Default::default() };
-        let moving = ProfileChoice { moving: Some(0.4), ..Default::default() };
-        let silent = file("a.toml", "base = \"wide\"\n");
-        let silent = ProfileChoice { config: silent, ..Default::default() };
-        let given = file("b.toml", "base = \"wide\"\nmoves_min = 0.4\n");
-        let given = ProfileChoice { config: given, ..Default::default() };
-        assert_eq!([ProfileChoice::default(), other, silent].map(moves_min), [0.2; 3]);
-        assert_eq!([set, moving, given].map(moves_min), [0.4; 3]);
     }
 
     #[test]

@@ -107,6 +107,7 @@ impl Clusters {
         self.drop_immovable(scans);
         self.include_ground(scans);
         self.find_earlier_hits(scans, history);
+        self.found.iter_mut().for_each(|f| f.cues.no_history = history.is_empty());
         let (of_column, found) = (&self.of_column, &self.found);
         let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);

@@ -16,33 +16,54 @@ const COULD_MOVE_MAX: f32 = 4.0;
 /// Pseudo-count added to the looks at voxels, so that few looks do not say much.
 const FEW_LOOKS: f32 = 8.0;
 
+/// The value of a cue.
+trait Cue: Copy {
+    const NONE: Self;
+    fn number(self) -> f32;
+}
+
+impl Cue for f32 {
+    const NONE: f32 = 0.0;
+    fn number(self) -> f32 {
+        self
+    }
+}
+
+/// 0 or 1, in a byte: cues are kept for every column.
+impl Cue for bool {
+    const NONE: bool = false;
+    fn number(self) -> f32 {
+        f32::from(u8::from(self))
+    }
+}
+
 /// Declares cues, each with the parameter that is its weight.
 macro_rules! cues {
     (
         $(#[$doc:meta])* pub struct $name:ident {
-            $($(#[$field_doc:meta])* pub $field:ident: $weight:ident,)*
+            $($(#[$field_doc:meta])* pub $field:ident: $type:ty => $weight:ident,)*
         }
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         pub struct $name {
-            $($(#[$field_doc])* pub $field: f32,)*
+            $($(#[$field_doc])* pub $field: $type,)*
         }
 
         impl $name {
             /// No cue at all.
-            pub const NONE: $name = $name { $($field: 0.0),* };
+            pub const NONE: $name = $name { $($field: <$type as Cue>::NONE),* };
 
             /// Names of the parameters that are their weights, in order.
             pub const WEIGHTS: &[&str] = &[$(stringify!($weight)),*];
 
             /// Their values, in order.
             pub fn values(&self) -> [f32; $name::WEIGHTS.len()] {
-                [$(self.$field),*]
+                [$(self.$field.number()),*]
             }
 
             fn logit(&self, params: &MovesParams) -> f32 {
-                params.moves_bias $(+ params.$weight * self.$field)*
+                params.moves_bias $(+ params.$weight * self.$field.number())*
             }
         }
     };
@@ -52,26 +73,28 @@ cues! {
     /// Cues to whether a column moves.
     pub struct Cues {
         /// Evidence for the cluster's motion beyond what the test asked for, at most 0.5.
-        pub margin: moves_margin,
+        pub margin: f32 => moves_margin,
         /// Share of the cluster's columns whose tracklets moved, relative to the quorum.
-        pub share: moves_share,
+        pub share: f32 => moves_share,
         /// Mean truncated residual of the motion, or of rest if none was tried, 0 to 1.
-        pub residual: moves_residual,
+        pub residual: f32 => moves_residual,
         /// Logarithm of the number of returns that were registered.
-        pub returns: moves_returns,
+        pub returns: f32 => moves_returns,
         /// Mean of log(1 + speed / its standard deviation) over the tracklets that moved.
-        pub certainty: moves_certainty,
+        pub certainty: f32 => moves_certainty,
         /// Share of looks that found something, of those at the cluster's voxels in sweeps in
         /// which, by its motion, it was not there yet.
-        pub worn: moves_worn,
+        pub worn: f32 => moves_worn,
         /// Share of the same looks that found nothing.
-        pub fresh: moves_fresh,
+        pub fresh: f32 => moves_fresh,
         /// By how much the column's own returns fit rest worse than the motion, -1 to 1.
-        pub misfit: moves_misfit,
+        pub misfit: f32 => moves_misfit,
         /// The encoder's score of what could move, nats: -4 to 4, 0 if it is ignored.
-        pub could_move: moves_could_move,
-        /// 1 if the test found it static. Of the others only `share` and `could_move` are set then.
-        pub stands: moves_stands,
+        pub could_move: f32 => moves_could_move,
+        /// There was no sweep before the pair that could have shown it moving or coming.
+        pub no_history: bool => moves_no_history,
+        /// The test found it static. Of the others only `share` and `could_move` are set then.
+        pub stands: bool => moves_stands,
     }
 }
 
@@ -102,13 +125,14 @@ impl Cues {
             fresh: 0.0,
             misfit: 0.0,
             could_move: 0.0,
-            stands: 0.0,
+            no_history: false,
+            stands: false,
         }
     }
 
     /// Cues of something static, with this [`Cues::share`] and [`Cues::could_move`].
     pub(super) fn stationary(share: f32, could_move: f32) -> Cues {
-        Cues { share, stands: 1.0, ..Cues::NONE }
+        Cues { share, stands: true, ..Cues::NONE }
             .with(ColumnCues { could_move, ..ColumnCues::NONE })
     }
 
@@ -230,20 +254,20 @@ mod tests {
                 let value = if other == name { 3f64.ln() } else { 0.0 };
                 params.set(other, Value::Number(value)).unwrap();
             }
-            let mut cues = Cues::NONE;
-            let all = [
-                &mut cues.margin,
-                &mut cues.share,
-                &mut cues.residual,
-                &mut cues.returns,
-                &mut cues.certainty,
-                &mut cues.worn,
-                &mut cues.fresh,
-                &mut cues.misfit,
-                &mut cues.could_move,
-                &mut cues.stands,
-            ];
-            *all.into_iter().nth(n).unwrap() = 1.0;
+            let one = |field: usize| f32::from(u8::from(field == n));
+            let cues = Cues {
+                margin: one(0),
+                share: one(1),
+                residual: one(2),
+                returns: one(3),
+                certainty: one(4),
+                worn: one(5),
+                fresh: one(6),
+                misfit: one(7),
+                could_move: one(8),
+                no_history: n == 9,
+                stands: n == 10,
+            };
             assert!((cues.probability(&params) - 0.75).abs() < 1e-6, "{name}");
         }
     }

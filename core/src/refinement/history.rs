@@ -46,6 +46,11 @@ impl History {
         (self.held, self.next) = (0, 0);
     }
 
+    /// Whether there was no sweep before the pair's first.
+    pub fn is_empty(&self) -> bool {
+        self.held == 0
+    }
+
     /// Remembers a sweep in place of the oldest, without the columns of what was seen to come from
     /// elsewhere: a vehicle that follows another comes to where that one was.
     pub fn push(&mut self, cloud: DetailedCloud, came: impl Fn(usize) -> bool) {

@@ -3,7 +3,6 @@
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use raywake::flow::for_pairs;
 use raywake::flow::rows::PointRow;
 use raywake::flow::{motion, place};
 use raywake_core::pose::Pose;
@@ -40,7 +39,7 @@ impl CloudFlow {
 ///
 /// a, b: N x 3 or more numbers: x, y, z, m.
 /// dt: time from a to b, s.
-/// profile, settings: as for Pipeline, but moves_min is 0.2: there is no history.
+/// profile, settings: as for Pipeline.
 /// ground: height of the ground in a's frame, m; default: estimated from a.
 /// sensor: x, y, z of the sensor in the clouds' frame, m; default: their origin, unless the ground
 ///     is too close to it.
@@ -65,7 +64,7 @@ pub fn flow(
     if !(dt.is_finite() && dt > 0.0) {
         return Err(PyValueError::new_err("dt must be positive and finite"));
     }
-    let profile = self::profile(profile, for_pairs, settings)?;
+    let profile = self::profile(profile, settings)?;
     let [first, second] = [cloud(a)?, cloud(b)?];
     let pose = pose.map(|value| self::pose(value, "pose")).transpose()?;
     let placed = py.detach(|| place::rig(&first, ground, sensor));

@@ -40,15 +40,10 @@ pub struct PyPipeline {
     memory: usize,
 }
 
-/// Returns a profile with other defaults, then some of its parameters set.
-pub fn profile(
-    name: &str,
-    defaults: fn(&mut Profile),
-    settings: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Profile> {
+/// Returns a profile with some of its parameters set.
+pub fn profile(name: &str, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Profile> {
     let mut profile = Profile::named(name)
         .ok_or_else(|| PyValueError::new_err(format!("there is no profile {name:?}")))?;
-    defaults(&mut profile);
     for (key, value) in settings.into_iter().flat_map(|settings| settings.iter()) {
         set(&mut profile, &key.extract::<String>()?, &value)?;
     }
@@ -96,7 +91,7 @@ impl PyPipeline {
         points_max: usize,
         threads: usize,
     ) -> PyResult<PyPipeline> {
-        let profile = self::profile(profile, |_| (), settings)?;
+        let profile = self::profile(profile, settings)?;
         let rig = rig.map_or_else(PyRig::alone, |rig| Ok(rig.clone()))?.0;
         let points_max = if points_max == 0 { profile.returns() } else { points_max };
         let options = EstimatorOptions { profile, rig, points_max, registers: find_poses, objects };

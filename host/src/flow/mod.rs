@@ -34,27 +34,10 @@ use rows::{Form, PointRow};
 /// Minimum speed over ground of a moving point, m/s.
 const MOVING_MPS: f64 = 0.5;
 
-/// Minimum P(moves) of what is reported as moving in a pair of clouds, unless the caller chooses.
-/// P(moves) was fitted to drives, where most of what moves was seen moving before; in a pair it is
-/// too small. On 180 pairs of simulated streets (six sets of drives, seed 9001; returns within
-/// 25 m) 60 to 96 % of what moves is found at 0.4, the value for drives, 80 to 99 % at 0.2 and at
-/// 0.1; the mean motion of what stands is 0.7 to 2.1 mm, 1.1 to 2.8 mm and 1.6 to 3.3 mm. Below 0.2
-/// there is more to lose than to gain.
-const PAIR_MOVES_MIN: f32 = 0.2;
-
-/// The parameters for a pair of clouds, in place of those for drives.
-pub fn for_pairs(profile: &mut Profile) {
-    profile.moves.moves_min = PAIR_MOVES_MIN;
-}
-
-fn profile(choice: &args::ProfileChoice) -> Result<Profile, Error> {
-    Ok(config::settings_over(choice, |settings| for_pairs(&mut settings.profile))?.profile)
-}
-
 /// Reads and registers the clouds, computes the flow and writes it.
 pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let form = Form::of(&args.out)?;
-    let profile = profile(&args.flow.profile)?;
+    let profile = config::profile(&args.flow.profile)?;
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let say = |text: &str| say(args.quiet, text);
     let beside = |file: &Option<PathBuf>| file.clone().unwrap_or(args.out.with_extension("png"));
@@ -194,26 +177,4 @@ fn census(rows: &[PointRow], dt_s: f64, dropped: &Dropped) -> String {
         count(&PointRow::valid),
         count(&moving),
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pairs_have_a_default_of_their_own() {
-        let choice = args::ProfileChoice::default();
-        assert_eq!(profile(&choice).unwrap().moves.moves_min, 0.2);
-        let moving = args::ProfileChoice { moving: Some(0.4), ..choice };
-        assert_eq!(profile(&moving).unwrap().moves.moves_min, 0.4);
-    }
-
-    #[test]
-    fn help_says_which() {
-        let mut program = <args::Args as clap::CommandFactory>::command();
-        let flow = program.find_subcommand_mut("flow").unwrap();
-        let help = flow.render_long_help().to_string();
-        let said = format!("default: {}, and {PAIR_MOVES_MIN}", Profile::hdl64().moves.moves_min);
-        assert!(help.contains(&said), "{help}");
-    }
 }

@@ -26,6 +26,7 @@ use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_io::source;
 use raywake_objects::estimate::FixedLag;
+use raywake_objects::params::TrackingParams;
 
 pub use ground::Ground;
 pub use report::TrackSummary;
@@ -95,9 +96,8 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
 
 /// Parameters of flow and tracking.
 fn settings(args: &args::TrackArgs) -> Result<Settings, RunError> {
-    let estimate = args.estimate.params();
-    let mut settings =
-        config::settings_over(&args.flow.profile, |s| s.objects.estimate = estimate)?;
+    let objects = TrackingParams { estimate: args.estimate.params(), ..TrackingParams::DEFAULT };
+    let mut settings = config::settings_over(&args.flow.profile, objects)?;
     args.recording.kind.adapt(&mut settings.profile);
     Ok(settings)
 }

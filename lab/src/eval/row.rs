@@ -207,7 +207,9 @@ row! {
     /// See `margin`.
     could_move: f32,
     /// See `margin`.
-    stands: f32,
+    no_history: bool,
+    /// See `margin`.
+    stands: bool,
 }
 
 /// Declares which columns are cues; the compiler checks that none is missing.
@@ -227,7 +229,10 @@ macro_rules! cue_columns {
     };
 }
 
-cue_columns!(margin, share, residual, returns, certainty, worn, fresh, misfit, could_move, stands);
+cue_columns!(
+    margin, share, residual, returns, certainty, worn, fresh, misfit, could_move, no_history,
+    stands
+);
 
 impl Row {
     /// Whether the labelled object moves.

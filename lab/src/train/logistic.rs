@@ -34,6 +34,19 @@ struct Slope {
     hessian: Vec<f64>,
 }
 
+impl Slope {
+    /// The same for weights of which some cannot change.
+    fn fixed(mut self, fixed: impl Fn(usize) -> bool) -> Slope {
+        let n = self.gradient.len();
+        for i in (0..n).filter(|i| fixed(*i)) {
+            self.gradient[i] = 0.0;
+            (0..n).for_each(|j| self.hessian[i.max(j) * n + i.min(j)] = 0.0);
+            self.hessian[i * (n + 1)] = 1.0;
+        }
+        self
+    }
+}
+
 /// Maximum number of Newton steps; about ten are needed.
 const STEPS_MAX: usize = 40;
 /// Decrease of the loss below which the fit has converged.
@@ -64,8 +77,18 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
     /// The weights that minimise the loss, bias last. `report` is called with weights and loss
     /// after every step.
     pub fn fit(&self, report: &mut dyn FnMut(&[f64], f64)) -> Vec<f64> {
-        let mut weights = vec![0.0; self.width + 1];
-        let mut here = self.slope(&weights, true);
+        self.fit_from(vec![0.0; self.width + 1], |_| true, report)
+    }
+
+    /// The same from given weights, of which only those that are `free` change.
+    pub fn fit_from(
+        &self,
+        mut weights: Vec<f64>,
+        free: impl Fn(usize) -> bool,
+        report: &mut dyn FnMut(&[f64], f64),
+    ) -> Vec<f64> {
+        let slope = |weights: &[f64]| self.slope(weights, true).fixed(|n| !free(n));
+        let mut here = slope(&weights);
         for _ in 0..STEPS_MAX {
             let Some(step) = cholesky(here.hessian.clone(), here.gradient.clone()) else {
                 break;
@@ -81,7 +104,7 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
                 break;
             };
             weights = moved;
-            here = self.slope(&weights, true);
+            here = slope(&weights);
             report(&weights, here.loss);
             if before - here.loss < LOSS_TOLERANCE {
                 break;
@@ -193,6 +216,17 @@ mod tests {
         };
         let w = data.fit(&mut |_, _| ());
         assert!((w[0] - 2.0 * 3f64.ln()).abs() < 1e-6 && (w[1] + 3f64.ln()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fixed_weights_stay_and_the_others_are_fitted_to_them() {
+        let data = noise();
+        let best = data.fit(&mut |_, _| ());
+        let start = [best[0], best[1], 0.0, 0.0, best[4]];
+        let fitted = data.fit_from(start.to_vec(), |n| n == 2 || n == 3, &mut |_, _| ());
+        let off = |n: usize| (fitted[n] - best[n]).abs();
+        assert_eq!([0, 1, 4].map(off), [0.0; 3]);
+        assert!(off(2).max(off(3)) < 1e-6, "{fitted:?} {best:?}");
     }
 
     #[test]

@@ -4,6 +4,8 @@ use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
 use crate::curve::{Curve, OperatingPoint};
 use crate::eval::{Row, rows_of};
+use clap::builder::PossibleValuesParser;
+use raywake_core::params::{MovesParams, Parameters, Value};
 use raywake_core::refinement::cues::Cues;
 use raywake_io::Error;
 use serde::Serialize;
@@ -23,6 +25,9 @@ pub struct Args {
     /// Folders of results of `raywake-lab eval --moving 0`; every fifth drive is held out
     #[arg(required = true, value_name = "OUT")]
     results: Vec<PathBuf>,
+    /// Fit this weight alone; the others stay as they are
+    #[arg(long, value_name = "WEIGHT", value_parser = PossibleValuesParser::new(names()))]
+    only: Option<String>,
     #[command(flatten)]
     outputs: Outputs,
 }
@@ -46,9 +51,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
     counts[0].both("training", "columns that move", "columns that are static")?;
     counts[1].both("held-out", "columns that move", "columns that are static")?;
     let mut progress = Vec::new();
-    let weights = training.fit(&mut |weights, training| {
+    let mut report = |weights: &[f64], training| {
         progress.push(Progress { training, held_out: held_out.loss(weights) });
-    });
+    };
+    let weights = match &args.only {
+        Some(only) => {
+            let free = names().position(|name| name == only);
+            training.fit_from(shipped(), |n| Some(n) == free, &mut report)
+        }
+        None => training.fit(&mut report),
+    };
     let scored = || {
         let rows = held_out.rows.chunks_exact(held_out.width).zip(&held_out.labels);
         rows.map(|(row, &moves)| (Data::score(&weights, row), moves))
@@ -108,10 +120,23 @@ fn reliability(scored: impl Iterator<Item = (f64, bool)>) -> (f64, Vec<(f64, u64
     (squares / count.max(1) as f64, bins)
 }
 
+/// Names of the weights, bias last.
+fn names() -> impl Iterator<Item = &'static str> {
+    Cues::WEIGHTS.iter().copied().chain(["moves_bias"])
+}
+
+/// The weights of the built-in profiles.
+fn shipped() -> Vec<f64> {
+    let value = |name| match MovesParams::DEFAULT.get(name) {
+        Some(Value::Single(weight)) => f64::from(weight),
+        other => unreachable!("{name} is {other:?}"),
+    };
+    names().map(value).collect()
+}
+
 /// The text of a file for `--config`.
 fn configuration(weights: &[f64]) -> String {
-    let names = Cues::WEIGHTS.iter().chain([&"moves_bias"]);
-    names.zip(weights).fold("base = \"hdl64\"\n".to_string(), |mut text, (name, weight)| {
+    names().zip(weights).fold("base = \"hdl64\"\n".to_string(), |mut text, (name, weight)| {
         let _ = writeln!(text, "{name} = {weight:.2}");
         text
     })
@@ -138,6 +163,14 @@ mod tests {
         assert!((brier - (2.0 * 0.0625 + 0.5625 + 0.0625) / 4.0).abs() < 1e-12);
         assert_eq!((bins[7].1, bins[7].2, bins[2].1, bins[2].2), (2, 3, 0, 1));
         assert!((bins[7].0 - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn shipped_weights_give_the_shipped_probability() {
+        let cues = Cues { margin: 0.3, returns: 4.0, no_history: true, ..Cues::NONE };
+        let score = Data::score(&shipped(), &cues.values());
+        let expected = f64::from(cues.probability(&MovesParams::DEFAULT));
+        assert!((1.0 / (1.0 + (-score).exp()) - expected).abs() < 1e-6);
     }
 
     #[test]
