@@ -63,7 +63,10 @@ pub fn conclude(
         of_boxes(&mut report, drives, &evidence, settings);
     }
     if let Some(table) = moving::semantic_kitti(drives.iter().map(|d| &d.returns)) {
-        report.section("Classes of returns").table(table);
+        let section = report.section("Classes of returns").table(table);
+        if let Some(table) = moving::class_confusion(drives.iter().map(|d| &d.returns.encoded)) {
+            section.table(table);
+        }
     }
     report
         .section("Time")

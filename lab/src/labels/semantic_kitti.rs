@@ -54,9 +54,19 @@ const CLASSES: [(u16, &str); 34] = [
 ];
 
 impl PointLabel {
+    /// The label of a class, without an instance.
+    pub fn of_class(class: u16) -> PointLabel {
+        PointLabel { class, instance: 0 }
+    }
+
     /// Name of the class; `None` if the data set has no such number.
     pub fn name(self) -> Option<&'static str> {
         CLASSES.iter().find(|c| c.0 == self.class).map(|c| c.1)
+    }
+
+    /// The same, or the number of a class without a name.
+    pub fn describe(self) -> String {
+        self.name().map_or(format!("class {}", self.class), String::from)
     }
 
     /// Whether it has no class or is an outlier (0 and 1).

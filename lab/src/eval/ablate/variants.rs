@@ -58,7 +58,7 @@ fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
 }
 
 /// All variants, in the order listed.
-pub const VARIANTS: [Variant; 26] = [
+pub const VARIANTS: [Variant; 29] = [
     of(BASE, "as given", |p| p),
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
     of("refine-2", "refined by 2 sweeps", |p| Profile { refinement_sweeps: 2, ..p }),
@@ -75,6 +75,18 @@ pub const VARIANTS: [Variant; 26] = [
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
     Variant { numbers: WeightSource::NoFilter, ..of("filter-off", "every solid column", |p| p) },
     Variant { numbers: WeightSource::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
+    of("encoder-no-veto", "no class stays where it is", |mut p| {
+        p.refinement.could_move_min = -8.0;
+        p
+    }),
+    of("encoder-no-body", "no class belongs to a body", |mut p| {
+        p.refinement.body_min = 8.0;
+        p
+    }),
+    of("encoder-no-cue", "P(moves) without the class", |mut p| {
+        p.moves.moves_could_move = 0.0;
+        p
+    }),
     Variant {
         numbers: WeightSource::Author,
         ..of("author-constancy", "the author's constants", |p| p)
@@ -147,6 +159,9 @@ mod tests {
         let other = [
             "filter-off",
             "encoder-off",
+            "encoder-no-veto",
+            "encoder-no-body",
+            "encoder-no-cue",
             "author-constancy",
             "sensor-frame",
             "dissertation",

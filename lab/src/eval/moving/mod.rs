@@ -1,11 +1,13 @@
 //! Moving or not: what is reported as moving against what moves, by columns and by returns.
 
+mod classes;
 mod columns;
 mod false_motion;
 mod first_sight;
 mod reliability;
 mod returns;
 
+pub use classes::class_confusion;
 pub use columns::ColumnVerdicts;
 pub use first_sight::FirstSights;
 pub use reliability::MovesReliability;

@@ -1,5 +1,6 @@
 //! Verdicts on returns: by labelled boxes or exact truth, and by the classes of SemanticKITTI.
 
+use super::classes::{EncodedCounts, index};
 use super::{MotionCounts, share};
 use crate::eval::collect::PairData;
 use crate::eval::objects::Present;
@@ -21,6 +22,8 @@ pub struct ReturnCounts {
     pub in_boxes: MotionCounts,
     /// By SemanticKITTI's class: number of returns, and of those reported as moving.
     pub classes: BTreeMap<u16, [u64; 2]>,
+    /// By SemanticKITTI's class and the encoder's.
+    pub encoded: BTreeMap<u16, EncodedCounts>,
 }
 
 /// Counts the returns of one drive.
@@ -65,10 +68,12 @@ impl ReturnVerdicts {
             self.counts.in_boxes.add(moves, *reported, mover_m);
         }
         let Some(semantic) = &self.semantic else { return Ok(()) };
-        for (label, reported) in semantic.returns(&seen.first)?.iter().zip(reported) {
+        let labels = semantic.returns(&seen.first)?;
+        for ((label, reported), flow) in labels.iter().zip(reported).zip(&seen.points) {
             let [all, moving] = self.counts.classes.entry(label.class).or_default();
             *all += 1;
             *moving += u64::from(*reported);
+            self.counts.encoded.entry(label.class).or_default()[index(flow.class)] += 1;
         }
         Ok(())
     }
@@ -110,11 +115,11 @@ struct ClassSums {
 
 impl ClassSums {
     fn add(&mut self, of_drive: &BTreeMap<u16, [u64; 2]>) {
-        let has_motion_labels = of_drive.keys().any(|class| label(*class).moving());
+        let has_motion_labels = of_drive.keys().any(|class| PointLabel::of_class(*class).moving());
         for (&class, counts) in of_drive {
             let add = |sum: &mut [u64; 2]| sum.iter_mut().zip(counts).for_each(|(s, n)| *s += n);
             add(self.classes.entry(class).or_default());
-            if let Some(moves) = class_moves(label(class), has_motion_labels) {
+            if let Some(moves) = class_moves(PointLabel::of_class(class), has_motion_labels) {
                 add(&mut self.of_motion[usize::from(moves)]);
             }
         }
@@ -130,10 +135,6 @@ impl ClassSums {
         let iou = 100.0 * share(found, moving + wrong);
         format!("Moving object segmentation: IoU {iou:.1} % of all labelled returns.")
     }
-}
-
-fn label(class: u16) -> PointLabel {
-    PointLabel { class, instance: 0 }
 }
 
 /// Whether the returns of a class move; `None` if unknown. If a drive's moving objects have no
@@ -154,8 +155,10 @@ pub fn semantic_kitti<'a>(drives: impl Iterator<Item = &'a ReturnCounts>) -> Opt
         let percent = Cell::Number(100.0 * share(moving, all), 2);
         TableRow::new([name.into(), Cell::Count(all), Cell::Count(moving), percent])
     };
-    let name = |class: u16| label(class).name().map_or(format!("class {class}"), String::from);
-    let classes = sums.classes.iter().map(|(&class, &counts)| row(&name(class), counts));
+    let classes = sums
+        .classes
+        .iter()
+        .map(|(&class, &counts)| row(&PointLabel::of_class(class).describe(), counts));
     let motions = ["all static", "all moving"].into_iter().zip(sums.of_motion);
     let motions = motions.filter(|(_, counts)| counts[0] > 0).map(|(name, c)| row(name, c));
     let caption = "Returns reported as moving, by SemanticKITTI's classes.";
@@ -168,6 +171,8 @@ pub fn semantic_kitti<'a>(drives: impl Iterator<Item = &'a ReturnCounts>) -> Opt
 mod tests {
     use super::*;
     use crate::scratch::Scratch;
+    use raywake_core::encoder::ColumnClass;
+    use raywake_core::output::PointFlow;
     use raywake_core::pose::Pose;
     use raywake_core::sweep::Point;
 
@@ -196,13 +201,17 @@ mod tests {
         let words = [50u32, 50 | 3 << 16, 10, 0].map(u32::to_le_bytes);
         scratch.write("labels/000004.label", words.as_flattened());
         let first = SweepData { frame: 4, points: vec![Point::default(); 4], ..Default::default() };
-        let (columns, points) = (Vec::new(), Vec::new());
+        let mut points = vec![PointFlow::default(); 4];
+        points[1].class = Some(ColumnClass::Structure);
+        let columns = Vec::new();
         let seen = PairData { index: 0, first, then: Pose::IDENTITY, dt_s: 0.1, columns, points };
         let semantic = Some(Semantic(scratch.path().to_path_buf()));
         let mut verdicts = ReturnVerdicts::new(View::Nowhere, 0.0, semantic);
         verdicts.pair(&seen, &[], None, &[true, false, true, false]).unwrap();
         let classes: Vec<_> = verdicts.counts.classes.into_iter().collect();
         assert_eq!(classes, [(0, [1, 0]), (10, [1, 1]), (50, [2, 1])]);
+        let encoded = verdicts.counts.encoded[&50];
+        assert_eq!((encoded[1], encoded.iter().sum::<u64>()), (1, 2));
         assert_eq!(verdicts.counts.in_boxes, MotionCounts::default());
     }
 }
