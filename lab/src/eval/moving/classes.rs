@@ -33,11 +33,9 @@ pub fn class_confusion<'a>(
         return None;
     }
     let row = |(&class, counts): (&u16, &EncodedCounts)| {
-        let of = encoded(counts);
-        let name =
-            PointLabel::of_class(class).name().map_or(format!("class {class}"), String::from);
+        let (name, of) = (PointLabel::of_class(class).describe(), encoded(counts));
         let shares = counts[..COUNTS - 1].iter().map(|n| Cell::Number(100.0 * share(*n, of), 1));
-        TableRow::new([name.into(), Cell::Count(of)].into_iter().chain(shares))
+        TableRow::new([name.as_str().into(), Cell::Count(of)].into_iter().chain(shares))
     };
     let shares: Vec<_> = ColumnClass::ALL.map(|c| format!("{}, %", c.name())).into();
     let columns: Vec<_> =
