@@ -5,10 +5,11 @@ use std::path::Path;
 
 use raywake_core::digest::Digest;
 use raywake_io::Error;
+use raywake_io::source::beside;
 
-/// Returns a line for a file, or for a folder and everything in it except linked folders; it
-/// changes if names or sizes do. Modification times are left out: a copy local to the machine that
-/// processes it has different ones.
+/// Returns a line for a file, or for a folder and everything in it except linked folders, with what
+/// is read from beside it; it changes if names or sizes do. Modification times are left out: a copy
+/// local to the machine that processes it has different ones.
 ///
 /// # Errors
 /// Something in it cannot be accessed.
@@ -16,6 +17,11 @@ pub fn inventory(path: &Path) -> Result<String, Error> {
     let mut found = Vec::new();
     let metadata = path.metadata().map_err(Error::reading(path))?;
     list(path, "", &metadata, &mut found)?;
+    for file in beside(path) {
+        let metadata = file.metadata().map_err(Error::reading(&file))?;
+        let name = file.file_name().unwrap_or_default();
+        found.push((format!("../{}", name.display()), metadata.len()));
+    }
     found.sort();
     let bytes: u64 = found.iter().map(|(_, bytes)| bytes).sum();
     let digest = Digest::of(format!("{found:?}").as_bytes());
@@ -70,5 +76,21 @@ mod tests {
         assert_ne!(now(), before);
         assert!(inventory(&at("poses.txt")).unwrap().starts_with("1 files of 2 bytes, "));
         assert!(inventory(&at("missing")).is_err());
+    }
+
+    #[test]
+    fn what_lies_beside_a_capture_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("day.pcap"), [0; 16]).unwrap();
+        let now = || inventory(&at("day.pcap")).unwrap();
+        let alone = now();
+        fs::write(at("other.json"), "1").unwrap();
+        assert_eq!(now(), alone);
+        fs::write(at("day.json"), "1").unwrap();
+        let described = now();
+        assert!(described.starts_with("2 files of 17 bytes, "), "{described}");
+        fs::write(at("day.json"), "12").unwrap();
+        assert_ne!(now(), described);
     }
 }

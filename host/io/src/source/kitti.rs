@@ -58,14 +58,19 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Er
 pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
     let mut opening = Opening::new(sequence, &sequence.join("velodyne"), "bin", "KITTI odometry")?;
     opening.read_times(&["times.txt"])?;
-    let apart = format!("../../poses/{}.txt", folder_name(sequence));
-    let own = [sequence.join("poses.txt"), sequence.join(apart)];
-    match options.poses.as_ref().or(own.iter().find(|p| p.is_file())) {
+    let own = odometry_poses(sequence);
+    match options.poses.as_ref().or(own.as_ref()) {
         _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Camera)?,
         None => options.proceed_without_poses(&opening.root, "no `poses.txt`")?,
     }
     Ok(opening.finish(options))
+}
+
+/// The poses of a KITTI odometry sequence, if there are any.
+pub(super) fn odometry_poses(sequence: &Path) -> Option<PathBuf> {
+    let apart = format!("../../poses/{}.txt", folder_name(sequence));
+    ["poses.txt", &apart].map(|name| sequence.join(name)).into_iter().find(|p| p.is_file())
 }
 
 /// Opens a folder of clouds of one format; poses come from the option `poses` or the headers of PCD

@@ -20,6 +20,7 @@
 mod argoverse;
 #[cfg(feature = "mcap")]
 mod bag;
+mod beside;
 mod bin;
 #[cfg(feature = "xml")]
 pub mod boost;
@@ -69,6 +70,7 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 
 use crate::Error;
 
+pub use beside::beside;
 pub use bin::BinFields;
 use clap::ValueEnum;
 pub use clouds::read_cloud;

@@ -1,7 +1,7 @@
 //! What the sensors of a capture sent, and where their sweeps begin.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use super::datagrams::{Datagram, Datagrams, FrameCounts, Sender};
@@ -11,7 +11,7 @@ use super::ouster::Ouster;
 use super::sensor::{Order, Sensor};
 use super::velodyne::Velodyne;
 use crate::Error;
-use crate::source::recognise::entries;
+use crate::source::beside::companion_file;
 
 /// A revolution at an end of the capture is left out if it has a smaller share of the fullest one's
 /// firings.
@@ -229,15 +229,4 @@ fn described(path: &Path) -> Result<(Vec<Sensor>, Option<Error>), Error> {
         }
     }
     Ok((described, unread))
-}
-
-/// The file that belongs to a capture: the one next to it with this extension and the longest name
-/// that begins the capture's.
-fn companion_file(path: &Path, extension: &str) -> Result<Option<PathBuf>, Error> {
-    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let mut files = entries(parent.unwrap_or(Path::new(".")))?;
-    let own = stem(path);
-    files.retain(|p| p.extension().is_some_and(|e| e == extension) && own.starts_with(&stem(p)));
-    Ok(files.into_iter().max_by_key(|p| stem(p).len()))
 }
