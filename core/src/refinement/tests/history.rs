@@ -99,3 +99,26 @@ fn arrivals_leave_no_earlier_trace() {
     history.find(cloud(10, 0, SWEEPS).all(), 0.1, &of_column, &mut found);
     assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
 }
+
+/// Whether the columns of a car say that there was no history; it moves with every sweep.
+fn without_history(refinement: &mut Refinement, n: usize, random: &mut Random) -> Vec<bool> {
+    let car = Car { centre: [24.0 + 3.0 * n as f32, 30.0], yaw: 0.0 };
+    give(refinement, &sweep_of(&car, random), n);
+    run(refinement, &vec![pack_flow([3, 0]); SIDE * SIDE]);
+    let found = (0..SIDE * SIDE).filter_map(|c| refinement.at(c as u32));
+    found.map(|found| found.cues.no_history).collect()
+}
+
+#[test]
+fn the_first_pair_has_no_history() {
+    let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
+    let random = &mut Random(8);
+    for _ in 0..2 {
+        assert!(without_history(&mut refinement, 0, random).is_empty());
+        for n in 1..4 {
+            let found = without_history(&mut refinement, n, random);
+            assert!(found.len() > 10 && found.iter().all(|none| *none == (n == 1)), "{n}: {found:?}");
+        }
+        refinement.clear();
+    }
+}
