@@ -117,7 +117,10 @@ fn the_first_pair_has_no_history() {
         assert!(without_history(&mut refinement, 0, random).is_empty());
         for n in 1..4 {
             let found = without_history(&mut refinement, n, random);
-            assert!(found.len() > 10 && found.iter().all(|none| *none == (n == 1)), "{n}: {found:?}");
+            assert!(
+                found.len() > 10 && found.iter().all(|none| *none == (n == 1)),
+                "{n}: {found:?}"
+            );
         }
         refinement.clear();
     }
