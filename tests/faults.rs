@@ -13,8 +13,9 @@ use raywake_tests::drives::{Setup, street, sweep};
 use raywake_tests::vulkan;
 use std::time::{Duration, Instant};
 
-/// Upper bound on the time any error may take to be returned.
-const SOON: Duration = Duration::from_secs(5);
+/// Only a call that never returns takes longer: on two cores that were busy otherwise, compiling the
+/// kernels before the error once took 6 s.
+const SOON: Duration = Duration::from_secs(60);
 
 #[test]
 fn a_missing_device() {
