@@ -13,8 +13,8 @@ use raywake_tests::drives::{Setup, street, sweep};
 use raywake_tests::vulkan;
 use std::time::{Duration, Instant};
 
-/// Only a call that never returns takes longer: on two cores that were busy otherwise, compiling the
-/// kernels before the error once took 6 s.
+/// Only a call that never returns takes longer: on two cores that were busy otherwise, compiling
+/// the kernels before the error once took 6 s.
 const SOON: Duration = Duration::from_secs(60);
 
 #[test]

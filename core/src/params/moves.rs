@@ -40,9 +40,10 @@ crate::params! {
         pub moves_could_move: f32 = 0.36, "", (-100 to 100), FITTED;
         /// Weight of there having been no sweep before the pair.
         pub moves_no_history: f32 = 0.9, "nat", (-100 to 100),
-            "Fitted alone, the other weights given, to the pairs of the same drives on their own \
-             (`eval --pairs`, `train moves --only moves_no_history OUT/pairs`); the first pairs of \
-             the drives, a sixteenth as many columns, give 1.02. On every fifth drive, held out, \
+            "Fitted alone, the other weights (which are older) given, to the pairs of the same \
+             drives on their own (`eval --pairs --moving 0 --set could_move_min=-8`, `train moves \
+             --only moves_no_history OUT/pairs`); the first pairs of the drives, a sixteenth as \
+             many columns, give 1.02. On every fifth drive, held out, \
              the loss over pairs is 0.094 with it, 0.104 without it.";
         /// Weight of the test's finding that the cluster is static.
         pub moves_stands: f32 = 0.75, "nat", (-100 to 100), FITTED;

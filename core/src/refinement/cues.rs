@@ -16,25 +16,17 @@ const COULD_MOVE_MAX: f32 = 4.0;
 /// Pseudo-count added to the looks at voxels, so that few looks do not say much.
 const FEW_LOOKS: f32 = 8.0;
 
-/// The value of a cue.
-trait Cue: Copy {
+/// The value of a cue: a number, or yes (1) or no (0) in a byte, as cues are kept for every column.
+trait Cue {
     const NONE: Self;
-    fn number(self) -> f32;
 }
 
 impl Cue for f32 {
     const NONE: f32 = 0.0;
-    fn number(self) -> f32 {
-        self
-    }
 }
 
-/// 0 or 1, in a byte: cues are kept for every column.
 impl Cue for bool {
     const NONE: bool = false;
-    fn number(self) -> f32 {
-        f32::from(u8::from(self))
-    }
 }
 
 /// Declares cues, each with the parameter that is its weight.
@@ -59,11 +51,11 @@ macro_rules! cues {
 
             /// Their values, in order.
             pub fn values(&self) -> [f32; $name::WEIGHTS.len()] {
-                [$(self.$field.number()),*]
+                [$(f32::from(self.$field)),*]
             }
 
             fn logit(&self, params: &MovesParams) -> f32 {
-                params.moves_bias $(+ params.$weight * self.$field.number())*
+                params.moves_bias $(+ params.$weight * f32::from(self.$field))*
             }
         }
     };
@@ -254,7 +246,7 @@ mod tests {
                 let value = if other == name { 3f64.ln() } else { 0.0 };
                 params.set(other, Value::Number(value)).unwrap();
             }
-            let one = |field: usize| f32::from(u8::from(field == n));
+            let one = |field: usize| f32::from(field == n);
             let cues = Cues {
                 margin: one(0),
                 share: one(1),

@@ -35,10 +35,10 @@ struct Slope {
 }
 
 impl Slope {
-    /// The same for weights of which some cannot change.
-    fn fixed(mut self, fixed: impl Fn(usize) -> bool) -> Slope {
+    /// The same if only the weights that are `free` can change.
+    fn only(mut self, free: impl Fn(usize) -> bool) -> Slope {
         let n = self.gradient.len();
-        for i in (0..n).filter(|i| fixed(*i)) {
+        for i in (0..n).filter(|i| !free(*i)) {
             self.gradient[i] = 0.0;
             (0..n).for_each(|j| self.hessian[i.max(j) * n + i.min(j)] = 0.0);
             self.hessian[i * (n + 1)] = 1.0;
@@ -87,7 +87,7 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
         free: impl Fn(usize) -> bool,
         report: &mut dyn FnMut(&[f64], f64),
     ) -> Vec<f64> {
-        let slope = |weights: &[f64]| self.slope(weights, true).fixed(|n| !free(n));
+        let slope = |weights: &[f64]| self.slope(weights, true).only(&free);
         let mut here = slope(&weights);
         for _ in 0..STEPS_MAX {
             let Some(step) = cholesky(here.hessian.clone(), here.gradient.clone()) else {

@@ -75,11 +75,11 @@ pub const VARIANTS: [Variant; 29] = [
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
     Variant { numbers: WeightSource::NoFilter, ..of("filter-off", "every solid column", |p| p) },
     Variant { numbers: WeightSource::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
-    of("encoder-no-veto", "no class stays where it is", |mut p| {
+    of("encoder-no-veto", "the encoder keeps nothing out of clusters", |mut p| {
         p.refinement.could_move_min = -8.0;
         p
     }),
-    of("encoder-no-body", "no class belongs to a body", |mut p| {
+    of("encoder-no-body", "the encoder completes no body", |mut p| {
         p.refinement.body_min = 8.0;
         p
     }),
