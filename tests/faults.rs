@@ -13,9 +13,8 @@ use raywake_tests::drives::{Setup, street, sweep};
 use raywake_tests::vulkan;
 use std::time::{Duration, Instant};
 
-/// Only a call that never returns takes longer: on two cores that were busy otherwise, compiling
-/// the kernels before the error once took 6 s.
-const SOON: Duration = Duration::from_secs(60);
+/// Upper bound on the time any error may take to be returned, apart from compiling kernels.
+const SOON: Duration = Duration::from_secs(5);
 
 #[test]
 fn a_missing_device() {
@@ -54,6 +53,10 @@ fn buffers_that_do_not_fit() {
 #[test]
 fn a_backend_that_cannot_be_set_up_in_time() {
     let setup = Setup::new(Profile::hdl64(), None);
+    // Compiles the kernels first: this alone took more than 5 s on two busy cores.
+    if setup.device(&Options::default()).is_none() {
+        return;
+    }
     let options = Options { timeout: Duration::from_nanos(1), ..Options::default() };
     let begin = Instant::now();
     let device = Device::new(&setup.profile, &setup.tables(), &options);

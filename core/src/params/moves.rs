@@ -5,7 +5,7 @@ const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simul
                       (`raywake-lab sim`, each rig: `--drives 3 --sweeps 25 --seed 9100`, \
                       `--drives 5 --sweeps 20 --seed 9200 --scenery street-fast`, `--drives 3 \
                       --sweeps 20 --seed 9300 --scenery street-cluttered`; `eval --moving 0 --set \
-                      could_move_min=-8`).";
+                      could_move_min=-8`), before there was `moves_no_history`.";
 
 crate::params! {
     /// How cues become P(moves): logistic regression, one weight per cue.
@@ -40,7 +40,7 @@ crate::params! {
         pub moves_could_move: f32 = 0.36, "", (-100 to 100), FITTED;
         /// Weight of there having been no sweep before the pair.
         pub moves_no_history: f32 = 0.9, "nat", (-100 to 100),
-            "Fitted alone, the other weights (which are older) given, to the pairs of the same \
+            "Fitted alone, the other weights given, to the pairs of the same \
              drives on their own (`eval --pairs --moving 0 --set could_move_min=-8`, `train moves \
              --only moves_no_history OUT/pairs`); the first pairs of the drives, a sixteenth as \
              many columns, give 1.02. On every fifth drive, held out, \

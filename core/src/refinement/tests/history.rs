@@ -100,11 +100,16 @@ fn arrivals_leave_no_earlier_trace() {
     assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
 }
 
-/// Whether the columns of a car say that there was no history; it moves with every sweep.
+/// Whether the columns of a car say that there was no history; it moves with every sweep, and
+/// another stands.
 fn without_history(refinement: &mut Refinement, n: usize, random: &mut Random) -> Vec<bool> {
     let car = Car { centre: [24.0 + 3.0 * n as f32, 30.0], yaw: 0.0 };
-    give(refinement, &sweep_of(&car, random), n);
+    let mut returns = sweep_of(&car, random);
+    Car { centre: [40.0, 50.0], yaw: 0.5 }.add_to(&mut returns, random);
+    give(refinement, &returns, n);
     run(refinement, &vec![pack_flow([3, 0]); SIDE * SIDE]);
+    let still = (0..SIDE * SIDE).filter(|c| refinement.at(*c as u32).is_none());
+    assert!(still.map(|c| refinement.clusters.cues(c)).all(|cues| !cues.no_history));
     let found = (0..SIDE * SIDE).filter_map(|c| refinement.at(c as u32));
     found.map(|found| found.cues.no_history).collect()
 }

@@ -6,21 +6,25 @@ use super::recognise::{entries, recognise};
 use super::{Format, kitti};
 use crate::Error;
 
-/// The files outside a recording that are read with it: those that describe the sensor of a
-/// capture, and the poses of a KITTI odometry sequence as distributed. None if there is no
-/// recording.
+/// The files outside a recording at `path` that are read with it: those that describe the sensor
+/// of a capture, the calibration of a KITTI raw drive's day, and the poses of a KITTI odometry
+/// sequence as distributed. Not the clouds of nuScenes if `path` is the folder of its tables: these
+/// name them. None if there is no recording, or what is beside it cannot be listed: opening it
+/// fails.
 pub fn beside(path: &Path) -> Vec<PathBuf> {
-    match recognise(path) {
-        Ok((Format::KittiOdometry, sequence)) => {
-            let poses = kitti::odometry_poses(&sequence);
-            poses.into_iter().filter(|poses| poses.parent() != Some(&sequence)).collect()
-        }
-        Ok((Format::Pcap, capture)) => {
-            let found = ["json", "xml"].map(|kind| companion_file(&capture, kind).ok().flatten());
-            found.into_iter().flatten().collect()
-        }
+    let Ok((format, root)) = recognise(path) else { return Vec::new() };
+    let read = match format {
+        Format::KittiRaw => vec![kitti::calibration(&root).ok().flatten()],
+        Format::KittiOdometry => vec![kitti::odometry_poses(&root)],
+        Format::Pcap => ["json", "xml"].map(|e| companion_file(&root, e).ok().flatten()).into(),
         _ => Vec::new(),
-    }
+    };
+    let resolved = |path: &Path| path.canonicalize().ok();
+    let outside = |file: &PathBuf| match (resolved(file), resolved(path)) {
+        (Some(file), Some(path)) => !file.starts_with(path),
+        _ => true,
+    };
+    read.into_iter().flatten().filter(outside).collect()
 }
 
 /// The file that belongs to a capture: the one next to it with this extension and the longest name
@@ -43,14 +47,25 @@ mod tests {
     fn what_is_read_from_elsewhere() {
         let temp = Temp::new();
         let at = |name: &str| temp.path().join(name);
-        for name in ["day.pcap", "day.json", "d.xml", "other.json", "poses/04.txt"] {
+        for name in ["day.pcap", "day.json", "d.xml", "other.json"] {
             temp.write(name, "");
         }
-        temp.write("sequences/04/velodyne/000000.bin", "");
         assert_eq!(beside(&at("day.pcap")), [at("day.json"), at("d.xml")]);
-        let sequence = at("sequences/04");
-        assert_eq!(beside(&sequence), [sequence.join("../../poses/04.txt")]);
-        temp.write("sequences/04/poses.txt", "");
-        assert!(beside(&sequence).is_empty() && beside(&at("d.xml")).is_empty());
+        assert!(beside(&at("d.xml")).is_empty());
+        for (drive, cloud, file) in [
+            ("a/sequences/04", "velodyne/000000.bin", "a/poses/04.txt"),
+            ("b/drive", "velodyne_points/data/0.bin", "b/calib_imu_to_velo.txt"),
+        ] {
+            temp.write(&format!("{drive}/{cloud}"), "");
+            let file = temp.write(file, "").canonicalize().unwrap();
+            let found = beside(&at(drive));
+            let found: Vec<_> = found.iter().map(|path| path.canonicalize().unwrap()).collect();
+            assert_eq!(found, [file]);
+            // Within the folder that has both, nothing lies outside.
+            assert!(beside(&at(&drive[..1])).is_empty(), "{drive}");
+        }
+        // Its own come first.
+        temp.write("a/sequences/04/poses.txt", "");
+        assert!(beside(&at("a/sequences/04")).is_empty());
     }
 }

@@ -67,6 +67,17 @@ pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Cl
     Ok(opening.finish(options))
 }
 
+/// Where a drive's IMU is.
+const CALIBRATION: &str = "calib_imu_to_velo.txt";
+
+/// The calibration of a KITTI raw drive, its own or its day's, if there is one.
+pub(super) fn calibration(drive: &Path) -> Result<Option<PathBuf>, Error> {
+    // From the resolved path: a drive named `.` has a parent too.
+    let full = drive.canonicalize().map_err(Error::reading(drive))?;
+    let places = [Some(full.as_path()), full.parent()];
+    Ok(places.into_iter().flatten().map(|p| p.join(CALIBRATION)).find(|p| p.is_file()))
+}
+
 /// The poses of a KITTI odometry sequence, if there are any.
 pub(super) fn odometry_poses(sequence: &Path) -> Option<PathBuf> {
     let apart = format!("../../poses/{}.txt", folder_name(sequence));
@@ -218,17 +229,12 @@ impl Opening {
 
     /// The drive's calibration, its day's, or KITTI's usual one with a note.
     fn velo_from_imu(&mut self) -> Result<Pose, Error> {
-        let name = "calib_imu_to_velo.txt";
-        // From the resolved path: a drive named `.` has a parent too.
-        let full = self.root.canonicalize().map_err(Error::reading(&self.root))?;
-        let places = [Some(full.as_path()), full.parent()];
-        let found = places.into_iter().flatten().map(|p| p.join(name)).find(|p| p.is_file());
-        if let Some(path) = found {
+        if let Some(path) = calibration(&self.root)? {
             return oxts::read_calibration(&path);
         }
         self.notes.push(format!(
-            "no {name} in the drive or above it: IMU assumed 0.81 m behind, 0.32 m beside and \
-             0.80 m below the Velodyne, axes parallel"
+            "no {CALIBRATION} in the drive or above it: IMU assumed 0.81 m behind, 0.32 m beside \
+             and 0.80 m below the Velodyne, axes parallel"
         ));
         Ok(oxts::default_velo_from_imu())
     }

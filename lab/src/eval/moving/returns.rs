@@ -1,6 +1,6 @@
 //! Verdicts on returns: by labelled boxes or exact truth, and by the classes of SemanticKITTI.
 
-use super::classes::{EncodedCounts, index};
+use super::classes::{self, EncodedCounts};
 use super::{MotionCounts, share};
 use crate::eval::collect::PairData;
 use crate::eval::objects::Present;
@@ -73,7 +73,7 @@ impl ReturnVerdicts {
             let [all, moving] = self.counts.classes.entry(label.class).or_default();
             *all += 1;
             *moving += u64::from(*reported);
-            self.counts.encoded.entry(label.class).or_default()[index(flow.class)] += 1;
+            self.counts.encoded.entry(label.class).or_default()[classes::index(flow.class)] += 1;
         }
         Ok(())
     }
