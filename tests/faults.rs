@@ -53,7 +53,7 @@ fn buffers_that_do_not_fit() {
 #[test]
 fn a_backend_that_cannot_be_set_up_in_time() {
     let setup = Setup::new(Profile::hdl64(), None);
-    // Compiles the kernels first: this alone took more than 5 s on two busy cores.
+    // Compiles the kernels first: including that, the error once took 6 s on two busy cores.
     if setup.device(&Options::default()).is_none() {
         return;
     }
