@@ -54,17 +54,17 @@ impl Scene {
     /// A street with buildings, parked cars and twenty seconds of traffic around a vehicle standing
     /// in the right lane at the street frame's origin.
     pub fn street(seed: u64) -> Scene {
-        Scene::around(seed, &Ego::Standing.plan(seed, 20.0), 20.0, 1.0, false)
+        Scene::around(seed, &Ego::Standing.plan(seed, 20.0), 20.0, 1.0, None)
     }
 
     /// A street built for this motion of the vehicle over `duration_s`: no path of traffic crosses
-    /// it. `density` scales the amount of traffic; a `cluttered` street has more fixtures.
+    /// it. `density` scales the amount of traffic; `extra` are additional fixtures.
     pub(crate) fn around(
         seed: u64,
         plan: &crate::ego::Plan,
         duration_s: f64,
         density: f64,
-        cluttered: bool,
+        extra: Option<street::Extra>,
     ) -> Scene {
         let mut rng = Rng::split(seed, 1);
         let slopes = [rng.range(-0.025, 0.025), rng.range(-0.025, 0.025)];
@@ -76,9 +76,9 @@ impl Scene {
             Pose::planar(rng.range(-200.0, 200.0), rng.range(-200.0, 200.0), 0.0, heading);
         let extent = street::Extent::around(&plan.path, duration_s);
         let mut fixtures = street::build(&ground, extent, plan.crossing, &mut Rng::split(seed, 2));
-        if cluttered {
+        if let Some(extra) = extra {
             let mut chance = Rng::split(seed, 9);
-            fixtures.extend(street::clutter(&ground, extent, plan.crossing, &mut chance));
+            fixtures.extend(street::add(&ground, extent, plan.crossing, extra, &mut chance));
         }
         let mut chance = Rng::split(seed, 3);
         let objects = traffic::fill(&fixtures, extent, plan, duration_s, density, &mut chance);

@@ -4,6 +4,7 @@ use crate::ego::{Ego, Pace, Plan};
 use crate::outskirts::{self, Place};
 use crate::path::Path;
 use crate::scene::Scene;
+use crate::street::Extra;
 use std::fmt;
 use std::str::FromStr;
 
@@ -19,6 +20,8 @@ pub enum Scenery {
     StreetFast,
     /// The same with creeping vehicles and many strolling people, for tuning.
     StreetSlow,
+    /// A slow one with crowds of people, standing and strolling among furniture, for tuning.
+    StreetCrowded,
     /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,
     /// This particular one.
@@ -40,8 +43,13 @@ impl std::error::Error for UnknownScenery {}
 
 impl Scenery {
     /// The street and its variants.
-    const STREETS: [Scenery; 4] =
-        [Scenery::Street, Scenery::StreetCluttered, Scenery::StreetFast, Scenery::StreetSlow];
+    const STREETS: [Scenery; 5] = [
+        Scenery::Street,
+        Scenery::StreetCluttered,
+        Scenery::StreetFast,
+        Scenery::StreetSlow,
+        Scenery::StreetCrowded,
+    ];
 
     /// Every scenery.
     pub fn all() -> impl Iterator<Item = Scenery> {
@@ -56,6 +64,7 @@ impl Scenery {
             Scenery::StreetCluttered => "street-cluttered",
             Scenery::StreetFast => "street-fast",
             Scenery::StreetSlow => "street-slow",
+            Scenery::StreetCrowded => "street-crowded",
             Scenery::Outskirts => "outskirts",
             Scenery::Only(place) => place.name(),
         }
@@ -78,11 +87,16 @@ impl Scenery {
         let (ego, pace) = match self {
             Scenery::StreetFast => (ego.out_of_town(seed), Pace::Fast),
             Scenery::StreetSlow => (ego, Pace::Slow),
+            Scenery::StreetCrowded => (ego, Pace::Crowd),
             _ => (ego, Pace::Town),
         };
         let plan = Plan { pace, ..ego.plan(seed, duration_s) };
-        let cluttered = self == Scenery::StreetCluttered;
-        (Scene::around(seed, &plan, duration_s, density, cluttered), plan.path)
+        let extra = match self {
+            Scenery::StreetCluttered => Some(Extra::Clutter),
+            Scenery::StreetCrowded => Some(Extra::Furniture),
+            _ => None,
+        };
+        (Scene::around(seed, &plan, duration_s, density, extra), plan.path)
     }
 }
 
@@ -99,7 +113,7 @@ impl FromStr for Scenery {
 mod tests {
     use super::*;
     use crate::collisions::check_clear;
-    use crate::object::Class;
+    use crate::object::{Class, Object};
     use std::collections::BTreeSet;
 
     #[test]
@@ -112,11 +126,12 @@ mod tests {
     }
 
     #[test]
-    fn no_object_passes_through_street_clutter() {
-        for seed in 0..10 {
+    fn no_object_passes_through_what_a_street_has_in_addition() {
+        let kinds = [Scenery::StreetCluttered, Scenery::StreetCrowded];
+        for (seed, scenery) in (0..10).flat_map(|seed| kinds.map(|scenery| (seed, scenery))) {
             let of = |scenery: Scenery| scenery.draw(seed, Ego::Any, 6.0, 1.0);
             let (plain, _) = of(Scenery::Street);
-            let (scene, path) = of(Scenery::StreetCluttered);
+            let (scene, path) = of(scenery);
             let more = &scene.fixtures[plain.fixtures.len()..];
             assert_eq!(plain.fixtures[..], scene.fixtures[..plain.fixtures.len()]);
             assert!(more.len() > 200, "{}", more.len());
@@ -124,9 +139,28 @@ mod tests {
             check_clear("the vehicle", &empty, more, Some((&path, [4.6, 1.9, 2.0])));
             for object in scene.objects {
                 let alone = Scene { objects: vec![object], ..empty.clone() };
-                check_clear(&format!("seed {seed}"), &alone, more, None);
+                check_clear(&format!("{scenery:?}, seed {seed}"), &alone, more, None);
             }
         }
+    }
+
+    #[test]
+    fn crowded_streets_have_people_close_together() {
+        let (scene, _) = Scenery::StreetCrowded.draw(1, Ego::Any, 6.0, 1.0);
+        check_clear("a crowd", &scene, &[], None);
+        let people: Vec<_> =
+            scene.objects.iter().filter(|o| o.class == Class::Pedestrian).collect();
+        let standing = people.iter().filter(|o| o.path.is_static()).count();
+        assert!(people.len() > 60 && 4 * standing > people.len(), "{standing} of {}", people.len());
+        let near = |a: &Object| {
+            let apart = |b: &&&Object| {
+                let [a, b] = [a, *b].map(|o| o.path.at(3.0));
+                (a.x - b.x).hypot(a.y - b.y) < 1.5
+            };
+            people.iter().filter(apart).count() > 1
+        };
+        let close = people.iter().filter(|o| near(o)).count();
+        assert!(3 * close > people.len(), "{close} of {}", people.len());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The street's background, block by block: closed rows of houses, houses behind gardens, parks.
 
 mod cluttered;
+mod crowded;
 mod fronts;
 mod furniture;
 mod green;
@@ -51,15 +52,28 @@ pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rn
     yard.fixtures
 }
 
-/// Builds the additional background of [`crate::Scenery::StreetCluttered`].
-pub(crate) fn clutter(
+/// What a street has in addition to the plain one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extra {
+    /// That of [`crate::Scenery::StreetCluttered`].
+    Clutter,
+    /// That of [`crate::Scenery::StreetCrowded`].
+    Furniture,
+}
+
+/// Builds the additional background of a street.
+pub(crate) fn add(
     ground: &Ground,
     extent: Extent,
     crossing: f64,
+    extra: Extra,
     rng: &mut Rng,
 ) -> Vec<Fixture> {
     let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
-    yard.clutter(extent.x);
+    match extra {
+        Extra::Clutter => yard.clutter(extent.x),
+        Extra::Furniture => yard.furnish(extent.x),
+    }
     yard.fixtures
 }
 

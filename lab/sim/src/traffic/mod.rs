@@ -55,6 +55,12 @@ pub(crate) fn fill(
     for _ in 0..amount(5.0, 0.2) {
         fill.mover(models::cyclist, |r| r.rider());
     }
+    if plan.pace == Pace::Crowd {
+        for _ in 0..amount(40.0, 1.0) {
+            fill.group();
+        }
+        return fill.objects;
+    }
     let slow = plan.pace == Pace::Slow;
     let people = if slow { amount(24.0, 0.8) } else { amount(16.0, 0.5) };
     for _ in 0..people {
@@ -104,6 +110,15 @@ impl Fill<'_> {
     fn companion(&mut self, path: Path) {
         let beside = self.rng.sign() * self.rng.range(0.55, 1.0);
         self.try_add(models::pedestrian, path.moved(0.0, beside));
+    }
+
+    /// People who stand or stroll together, or one alone, if there is room.
+    fn group(&mut self) {
+        let Some(path) = self.mover(models::pedestrian, |r| r.stroller()) else { return };
+        for _ in 0..(self.rng.unit() * 5.0) as u32 {
+            let [x, y] = [0; 2].map(|_| self.rng.range(-1.5, 1.5));
+            self.try_add(models::pedestrian, path.clone().moved(x, y));
+        }
     }
 
     /// One of [`DRIVERS`].

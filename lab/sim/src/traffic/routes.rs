@@ -1,6 +1,6 @@
 //! Paths of traffic: along, across, turning, braking, overtaking.
 
-use crate::dimensions::ROAD_HALF;
+use crate::dimensions::{EDGE, ROAD_HALF};
 use crate::ego::{LANE, Pace, Plan};
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
@@ -29,7 +29,7 @@ impl Routes<'_> {
         match (self.plan.pace, nimble) {
             (Pace::Fast, true) => self.fast(36.0),
             (Pace::Fast, false) => self.fast(25.0),
-            (Pace::Slow, _) => self.creeping(),
+            (Pace::Slow | Pace::Crowd, _) => self.creeping(),
             (Pace::Town, true) => self.nimble(),
             (Pace::Town, false) => self.heavy(),
         }
@@ -141,12 +141,30 @@ impl Routes<'_> {
         Path::from(state)
     }
 
+    /// Anywhere between the houses, standing there or walking in any direction.
+    pub(super) fn stroller(&mut self) -> Path {
+        // Room for a group.
+        const REACH: f64 = EDGE - 2.2;
+        let (t, x) = self.meeting();
+        let [from, to] = [0; 2].map(|_| self.rng.range(-REACH, REACH));
+        let speed = self.rng.range(0.4, 1.8);
+        if self.rng.chance(0.35) {
+            return Path::stationary(x, from, self.rng.range(-PI, PI));
+        }
+        // At the end of the drive it is at `to`, or on the way there.
+        let across = ((to - from) / self.duration_s).clamp(-0.95 * speed, 0.95 * speed);
+        let turn = (across / speed).asin();
+        let yaw = if self.rng.chance(0.5) { turn } else { PI - turn };
+        Path::from(State { x: x - speed * yaw.cos() * t, y: from, yaw, speed })
+    }
+
     /// On a sidewalk, standing there, or crossing the main road.
     pub(super) fn walker(&mut self) -> Path {
         let (t, x) = self.meeting();
         let (sign, side) = (self.rng.sign(), self.rng.sign());
         let ([slow, fast], aside) = match self.plan.pace {
             Pace::Slow => ([0.4, 1.4], [0.8, 3.8]),
+            Pace::Crowd => ([0.4, 1.8], [-3.5, 3.8]),
             _ => ([0.8, 2.0], [1.4, 3.2]),
         };
         let speed = self.rng.range(slow, fast);

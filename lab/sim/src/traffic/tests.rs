@@ -11,7 +11,7 @@ const DURATION_S: f64 = 6.0;
 /// States of all objects every half second, with the vehicle last.
 fn states(seed: u64) -> (Vec<Class>, Vec<Vec<State>>) {
     let plan = Ego::Any.plan(seed, DURATION_S);
-    let scene = Scene::around(seed, &plan, DURATION_S, 1.0, false);
+    let scene = Scene::around(seed, &plan, DURATION_S, 1.0, None);
     let times: Vec<f64> = (0..=12).map(|i| 0.5 * f64::from(i)).collect();
     let paths = scene.objects.iter().map(|o| &o.path).chain([&plan.path]);
     let states = paths.map(|p| times.iter().map(|&t| p.at(t)).collect()).collect();
