@@ -107,7 +107,7 @@ impl Clusters {
         self.drop_immovable(scans);
         self.include_ground(scans);
         self.find_earlier_hits(scans, history);
-        self.found.iter_mut().for_each(|f| f.cues.no_history = history.is_empty());
+        self.found.iter_mut().for_each(|f| f.cues.no_history = history.is_short());
         let (of_column, found) = (&self.of_column, &self.found);
         let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);
@@ -265,7 +265,8 @@ impl Clusters {
     fn find_earlier_hits(&mut self, scans: Scans, history: &History) {
         let (of_column, found) = (&self.of_column, &mut self.found);
         found.iter_mut().for_each(|f| f.looks = Looks::default());
-        history.find(scans.first, scans.span_s, of_column, found);
+        let acceleration = scans.scaled.acceleration(scans.span_s);
+        history.find(scans.first, scans.span_s, acceleration, of_column, found);
         for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
             found.cues.worn = found.looks.worn();
             found.cues.fresh = found.looks.fresh();

@@ -83,7 +83,8 @@ cues! {
         pub misfit: f32 => moves_misfit,
         /// The encoder's score of what could move, nats: -4 to 4, 0 if it is ignored.
         pub could_move: f32 => moves_could_move,
-        /// There was no sweep before the pair that could have shown it moving or coming.
+        /// There was at most one sweep before the pair: no tracklet could tell that it moved
+        /// before, and hardly anything that it came.
         pub no_history: bool => moves_no_history,
         /// The test found it static. Of the others only `share` and `could_move` are set then.
         pub stands: bool => moves_stands,
@@ -145,8 +146,10 @@ impl Cues {
 pub struct Looks {
     /// Number of looks: voxels times sweeps.
     pub made: u32,
-    /// How many found something.
+    /// How many found something other than, perhaps, the cluster itself when it was slower.
     pub hits: u32,
+    /// How many found nothing.
+    pub empty: u32,
 }
 
 impl Looks {
@@ -157,7 +160,7 @@ impl Looks {
 
     /// The same for looks that found nothing.
     pub fn fresh(&self) -> f32 {
-        (self.made - self.hits) as f32 / (self.made as f32 + FEW_LOOKS)
+        self.empty as f32 / (self.made as f32 + FEW_LOOKS)
     }
 }
 

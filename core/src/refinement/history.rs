@@ -13,6 +13,10 @@ use crate::record::NONE;
 /// was where one is now a second ago, if it keeps its distance.
 const HISTORY: usize = 6;
 
+/// From this number of sweeps before the pair's first on, tracklets predict: those of the pair
+/// before have been observed twice.
+const PREDICTED: usize = 2;
+
 const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
 
 /// One earlier sweep.
@@ -46,9 +50,9 @@ impl History {
         (self.held, self.next) = (0, 0);
     }
 
-    /// Whether there was no sweep before the pair's first.
-    pub fn is_empty(&self) -> bool {
-        self.held == 0
+    /// Whether there were too few sweeps before the pair's first for tracklets to predict anything.
+    pub fn is_short(&self) -> bool {
+        self.held < PREDICTED
     }
 
     /// Remembers a sweep in place of the oldest, without the columns of what was seen to come from
@@ -76,14 +80,16 @@ impl History {
     }
 
     /// Counts what was hit before in the columns of the moving clusters of the pair's first sweep;
-    /// the pair spans `span_s`.
+    /// the pair spans `span_s`. What moves may have sped up by `acceleration`, voxels per span².
     pub fn find(
         &self,
         first: DetailedCloud,
         span_s: f64,
+        acceleration: f32,
         of_column: &[u32],
         found: &mut [Hypothesis],
     ) {
+        let reach = 2.0 * first.side as f32;
         for (c, &n) in of_column[..first.side * first.side].iter().enumerate() {
             let levels = first.levels(c);
             if n == NONE || levels == 0 {
@@ -95,16 +101,44 @@ impl History {
             for past in &self.sweeps[..self.held] {
                 let spans = ((first.stamp_s - past.stamp_s) / span_s) as f32;
                 // If what was here then is part of this cluster, it is now that much farther on.
-                let on = [0, 1].map(|a| at[a] as f32 + 0.5 + spans * by[a]);
-                if first.column_at(on).is_some_and(|on| of_column[on] == n) {
+                let is_part = |[x, y]: [f32; 2]| {
+                    let on = [at[0] as f32 + 0.5 + x, at[1] as f32 + 0.5 + y];
+                    first.column_at(on).is_some_and(|on| of_column[on] == n)
+                };
+                if is_part(by.map(|b| spans * b)) {
                     continue;
                 }
                 let Some(were) = past.around(&first, at) else { continue };
+                let hits = (levels & were).count_ones();
                 one.looks.made += levels.count_ones();
-                one.looks.hits += (levels & were).count_ones();
+                one.looks.empty += (levels & !were).count_ones();
+                // What was slower then came less far: the hits may have been of itself.
+                if hits > 0 && !travelled(by, acceleration, spans, reach).any(is_part) {
+                    one.looks.hits += hits;
+                }
             }
         }
     }
+}
+
+/// How far something that moves by `by` voxels per span may have come in the last `spans`, in steps
+/// of at most one voxel, none beyond `reach` voxels. It may have sped up by `acceleration` voxels
+/// per span², from rest at the earliest.
+fn travelled(
+    by: [f32; 2],
+    acceleration: f32,
+    spans: f32,
+    reach: f32,
+) -> impl Iterator<Item = [f32; 2]> {
+    let speed = libm::hypotf(by[0], by[1]).max(f32::MIN_POSITIVE);
+    let starting = spans.min(speed / acceleration);
+    let least = speed * starting - 0.5 * acceleration * starting * starting;
+    let more = (speed * spans).min(reach) - least;
+    let steps = libm::ceilf(more).max(0.0);
+    (0..=steps as u32).map(move |n| {
+        let length = least + more * (n as f32 / steps.max(1.0));
+        by.map(|b| b / speed * length)
+    })
 }
 
 impl PastSweep {

@@ -85,6 +85,11 @@ impl Scaled {
         self.sight_distance.max(self.params.sight_angle_rad * distance)
     }
 
+    /// How fast what moves may have sped up, voxels per span², if a span is `span_s` seconds.
+    pub fn acceleration(&self, span_s: f64) -> f32 {
+        (self.params.acceleration_mps2 * span_s * span_s / self.voxel_m) as f32
+    }
+
     /// How far displacements over `span_s` seconds are searched either way, voxels.
     pub fn search_reach(&self, span_s: f64) -> i32 {
         let reach = libm::round(self.params.search_speed_mps * span_s / self.voxel_m);

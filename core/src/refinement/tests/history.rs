@@ -26,6 +26,16 @@ fn cloud(from: i32, corner: i32, n: usize) -> Kept {
 
 /// The looks at a block that is claimed to move by `by` columns per sweep and was seen at `at(n)`.
 fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks {
+    looks_if_sped_up(0.0, by, at, corner)
+}
+
+/// The same if it may have sped up by `acceleration` columns per sweep².
+fn looks_if_sped_up(
+    acceleration: f32,
+    by: f32,
+    at: impl Fn(i32) -> i32,
+    corner: impl Fn(i32) -> i32,
+) -> Looks {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     for n in 0..SWEEPS {
         history.push(cloud(at(n as i32), corner(n as i32), n).all(), |_| false);
@@ -38,7 +48,7 @@ fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks
     }
     let motion = Motion::around([0.0; 2]).displaced([by, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find(first.all(), 0.1, &of_column, &mut found);
+    history.find(first.all(), 0.1, acceleration, &of_column, &mut found);
     found[0].looks
 }
 
@@ -69,6 +79,25 @@ fn nothing_is_known_where_hidden_or_without_a_sweep() {
 }
 
 #[test]
+fn what_has_just_started_is_not_worn_by_itself() {
+    // It stood at column 10, and moved by one column in the last sweep.
+    let start = |acceleration| looks_if_sped_up(acceleration, 1.0, |n| 10 + n / 5, |_| 0);
+    let (steady, started) = (start(0.0), start(1.0));
+    assert!(steady.worn() > 0.3, "{}", steady.worn());
+    assert_eq!((started.worn(), started.fresh()), (0.0, steady.fresh()));
+    // At a tenth of that it would have come at least half as far, and was never there.
+    let gentle = start(0.1);
+    assert!(gentle.hits > 0 && gentle.hits < steady.hits, "{gentle:?} {steady:?}");
+    // What is in front of it is not of itself, however it sped up.
+    let standing = looks_if_sped_up(1.0, 5.0, |_| 10, |_| 0);
+    assert_eq!(standing, looks(5.0, |_| 10, |_| 0));
+    // Stamps far apart, or hardly any motion, end after a few steps.
+    let far = looks_if_sped_up(300.0, 1e30, |_| 10, |_| 0);
+    assert_eq!(far.hits, far.made);
+    assert_eq!(looks_if_sped_up(1.0, 1e-30, |_| 10, |_| 0), Looks::default());
+}
+
+#[test]
 fn arrivals_are_new() {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     let first = cloud(13, 0, SWEEPS);
@@ -96,7 +125,7 @@ fn arrivals_leave_no_earlier_trace() {
     (10..10 + LENGTH).for_each(|i| of_column[i * SIDE + 20] = 0);
     let motion = Motion::around([0.0; 2]).displaced([1.0, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find(cloud(10, 0, SWEEPS).all(), 0.1, &of_column, &mut found);
+    history.find(cloud(10, 0, SWEEPS).all(), 0.1, 0.0, &of_column, &mut found);
     assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
 }
 
@@ -115,15 +144,15 @@ fn without_history(refinement: &mut Refinement, n: usize, random: &mut Random) -
 }
 
 #[test]
-fn the_first_pair_has_no_history() {
+fn the_first_two_pairs_have_no_history() {
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     let random = &mut Random(8);
     for _ in 0..2 {
         assert!(without_history(&mut refinement, 0, random).is_empty());
-        for n in 1..4 {
+        for n in 1..5 {
             let found = without_history(&mut refinement, n, random);
             assert!(
-                found.len() > 10 && found.iter().all(|none| *none == (n == 1)),
+                found.len() > 10 && found.iter().all(|none| *none == (n < 3)),
                 "{n}: {found:?}"
             );
         }
