@@ -266,7 +266,10 @@ impl Clusters {
         let (of_column, found) = (&self.of_column, &mut self.found);
         found.iter_mut().for_each(|f| f.looks = Looks::default());
         let acceleration = scans.scaled.acceleration(scans.span_s);
-        history.find(scans.first, scans.span_s, acceleration, of_column, found);
+        // A car may have pulled out a moment ago, a wall may not.
+        let could_start = |c| scans.could_move(c) >= 0.0;
+        let at = (scans.first, scans.span_s);
+        history.find(at, acceleration, could_start, of_column, found);
         for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
             found.cues.worn = found.looks.worn();
             found.cues.fresh = found.looks.fresh();

@@ -146,7 +146,7 @@ impl Cues {
 pub struct Looks {
     /// Number of looks: voxels times sweeps.
     pub made: u32,
-    /// How many found something other than, perhaps, the cluster itself when it was slower.
+    /// How many found something other than, perhaps, the cluster itself before it started.
     pub hits: u32,
     /// How many found nothing.
     pub empty: u32,

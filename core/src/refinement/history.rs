@@ -2,7 +2,7 @@
 //!
 //! Registration considers only a few sweeps. A static object may look so different from one sweep
 //! to the next that a motion explains it better; but its places were hit long before the motion
-//! would have brought it there.
+//! would have brought it there. A car that has just pulled out was at its places before, too.
 
 use super::cloud::{Cloud, DetailedCloud};
 use super::hypothesis::Hypothesis;
@@ -80,12 +80,13 @@ impl History {
     }
 
     /// Counts what was hit before in the columns of the moving clusters of the pair's first sweep;
-    /// the pair spans `span_s`. What moves may have sped up by `acceleration`, voxels per span².
+    /// the pair spans `span_s`. Columns that `could_start` may have been at rest and sped up by
+    /// `acceleration`, voxels per span².
     pub fn find(
         &self,
-        first: DetailedCloud,
-        span_s: f64,
+        (first, span_s): (DetailedCloud, f64),
         acceleration: f32,
+        could_start: impl Fn(usize) -> bool,
         of_column: &[u32],
         found: &mut [Hypothesis],
     ) {
@@ -112,8 +113,9 @@ impl History {
                 let hits = (levels & were).count_ones();
                 one.looks.made += levels.count_ones();
                 one.looks.empty += (levels & !were).count_ones();
-                // What was slower then came less far: the hits may have been of itself.
-                if hits > 0 && !travelled(by, acceleration, spans, reach).any(is_part) {
+                // What started since came less far: the hits may have been of itself.
+                let own = || since_rest(by, acceleration, spans, reach).any(is_part);
+                if hits > 0 && !(could_start(c) && own()) {
                     one.looks.hits += hits;
                 }
             }
@@ -121,21 +123,21 @@ impl History {
     }
 }
 
-/// How far something that moves by `by` voxels per span may have come in the last `spans`, in steps
-/// of at most one voxel, none beyond `reach` voxels. It may have sped up by `acceleration` voxels
-/// per span², from rest at the earliest.
-fn travelled(
+/// How far something that moves by `by` voxels per span may have come since it was at rest, at most
+/// `spans` ago, if it sped up by at most `acceleration` voxels per span²: in steps of at most one
+/// voxel, none beyond `reach` voxels. Nothing if it cannot have been at rest.
+fn since_rest(
     by: [f32; 2],
     acceleration: f32,
     spans: f32,
     reach: f32,
 ) -> impl Iterator<Item = [f32; 2]> {
     let speed = libm::hypotf(by[0], by[1]).max(f32::MIN_POSITIVE);
-    let starting = spans.min(speed / acceleration);
-    let least = speed * starting - 0.5 * acceleration * starting * starting;
+    let was_at_rest = speed <= acceleration * spans;
+    let least = 0.5 * speed * (speed / acceleration);
     let more = (speed * spans).min(reach) - least;
     let steps = libm::ceilf(more).max(0.0);
-    (0..=steps as u32).map(move |n| {
+    (0..=steps as u32).filter(move |_| was_at_rest).map(move |n| {
         let length = least + more * (n as f32 / steps.max(1.0));
         by.map(|b| b / speed * length)
     })

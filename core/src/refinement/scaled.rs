@@ -85,7 +85,7 @@ impl Scaled {
         self.sight_distance.max(self.params.sight_angle_rad * distance)
     }
 
-    /// How fast what moves may have sped up, voxels per span², if a span is `span_s` seconds.
+    /// How fast what starts may speed up, voxels per span², if a span is `span_s` seconds.
     pub fn acceleration(&self, span_s: f64) -> f32 {
         (self.params.acceleration_mps2 * span_s * span_s / self.voxel_m) as f32
     }
