@@ -5,7 +5,8 @@ const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simul
                       (`raywake-lab sim`, each rig: `--drives 3 --sweeps 25 --seed 9100`, \
                       `--drives 5 --sweeps 20 --seed 9200 --scenery street-fast`, `--drives 3 \
                       --sweeps 20 --seed 9300 --scenery street-cluttered`; `eval --moving 0 --set \
-                      could_move_min=-8`), before there was `moves_no_history`.";
+                      could_move_min=-8`), before there were \
+                      `moves_no_history` and `acceleration_mps2`.";
 
 crate::params! {
     /// How cues become P(moves): logistic regression, one weight per cue.
@@ -30,7 +31,7 @@ crate::params! {
         pub moves_returns: f32 = 0.85, "nat", (-100 to 100), FITTED;
         /// Weight of the certainty of the tracklets that moved.
         pub moves_certainty: f32 = -0.59, "nat", (-100 to 100), FITTED;
-        /// Weight of the share of earlier looks at a cluster's voxels that found something.
+        /// Weight of the share of earlier looks at a cluster's voxels that hit something else.
         pub moves_worn: f32 = -0.51, "nat", (-100 to 100), FITTED;
         /// Weight of the share of those looks that found nothing.
         pub moves_fresh: f32 = 1.44, "nat", (-100 to 100), FITTED;
@@ -42,8 +43,9 @@ crate::params! {
         pub moves_no_history: f32 = 0.9, "nat", (-100 to 100),
             "Fitted alone, the other weights given, to the pairs of the same \
              drives on their own (`eval --pairs --moving 0 --set could_move_min=-8`, `train moves \
-             --only moves_no_history OUT/pairs`). The first pairs of the drives, a sixteenth as \
-             many columns, give 1.06, the second ones 0.72. On every fifth drive, held out, \
+             --only moves_no_history OUT/pairs`). On drives, those and twelve crowded \
+             ones (`--drives 3 --sweeps 20 --seed 9400 --scenery street-crowded`), first pairs \
+             give 1.06, second ones 0.72. On every fifth drive, held out, \
              the loss over pairs is 0.094 with it, 0.104 without it.";
         /// Weight of the test's finding that the cluster is static.
         pub moves_stands: f32 = 0.75, "nat", (-100 to 100), FITTED;

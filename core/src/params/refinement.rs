@@ -148,19 +148,20 @@ crate::params! {
             "At 0 precision and recall are the same to 0.1 points on simulated streets as above; \
              far from movers, four HDL-32E on outskirts (`--drives 6 --sweeps 25 --seed 7070`) \
              have 649 false moving columns, 528 here.";
-        /// A cluster is static if something was hit in more than this share of looks at its voxels
-        /// in sweeps in which, by its motion, it was not there yet.
+        /// A cluster is static if something else was hit in more than this share of looks at its
+        /// voxels in sweeps in which, by its motion, it was not there yet.
         pub worn_max: f32 = 0.5, "", (0 to 1),
             "2 % of simulated moving columns are in such clusters, and a quarter of the static \
-             ones far from any mover.";
+             ones far from any mover (before `acceleration_mps2`).";
         /// How fast what starts may speed up. What was hit where a cluster may have been at rest
-        /// before it started does not count against it, unless it could not move.
+        /// before it started does not count against it, unless the encoder thinks that it could not
+        /// move rather than that it could.
         pub acceleration_mps2: f64 = 3.0, "m/s²", (0 to 100),
             "A car that pulls out. Columns reported as moving on simulated streets (`raywake-lab \
-             sim --drives 3 --sweeps 25 --seed 9001`, plain, slow and, two drives, crowded; \
-             `vlp32x2` and `hdl64`): precision 96.0, 96.0 and 98.0 %, recall 97.4, 92.2 and 91.3 \
-             at 0; 96.1, 96.0, 98.0 and 97.4, 92.3, 91.5 at 1.5; 95.9, 95.8, 98.0 and 97.4, 93.1, \
-             92.4 here.";
+             sim --sweeps 25 --seed 9001`, `vlp32x2` and `hdl64`), precision and recall at 0, 1.5 \
+             and here: plain (`--drives 3`) 96.0 and 97.4 %, 96.1 and 97.4, 95.9 and 97.4; slow \
+             96.0 and 92.2, 96.0 and 92.3, 95.8 and 93.1; crowded (`--drives 2`) 98.3 and 88.8, \
+             98.2 and 88.9, 98.3 and 90.0.";
         /// Beyond this length a cluster that moved needs less evidence, in inverse proportion: its
         /// sides slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;

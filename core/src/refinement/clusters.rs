@@ -266,8 +266,8 @@ impl Clusters {
         let (of_column, found) = (&self.of_column, &mut self.found);
         found.iter_mut().for_each(|f| f.looks = Looks::default());
         let acceleration = scans.scaled.acceleration(scans.span_s);
-        // A car may have pulled out a moment ago, a wall may not.
-        let could_start = |c| scans.could_move(c) >= 0.0;
+        // A car may have pulled out a moment ago; a wall cannot have.
+        let could_start = |c| scans.could_rather_move(c);
         let at = (scans.first, scans.span_s);
         history.find(at, acceleration, could_start, of_column, found);
         for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
@@ -294,7 +294,7 @@ impl Clusters {
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
                 if *of_column == NONE
                     && found.footprint.holds(at, margin)
-                    && scans.may_be_below(column)
+                    && scans.could_rather_move(column)
                 {
                     *of_column = n as u32;
                 }

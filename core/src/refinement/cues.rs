@@ -74,8 +74,8 @@ cues! {
         pub returns: f32 => moves_returns,
         /// Mean of log(1 + speed / its standard deviation) over the tracklets that moved.
         pub certainty: f32 => moves_certainty,
-        /// Share of looks that found something, of those at the cluster's voxels in sweeps in
-        /// which, by its motion, it was not there yet.
+        /// Share of looks that hit something else, of those at the cluster's voxels in sweeps in
+        /// which, by its motion, it was not there yet ([`Looks`]).
         pub worn: f32 => moves_worn,
         /// Share of the same looks that found nothing.
         pub fresh: f32 => moves_fresh,
@@ -83,8 +83,8 @@ cues! {
         pub misfit: f32 => moves_misfit,
         /// The encoder's score of what could move, nats: -4 to 4, 0 if it is ignored.
         pub could_move: f32 => moves_could_move,
-        /// There was at most one sweep before the pair: no tracklet could tell that it moved
-        /// before, and hardly anything that it came.
+        /// There was at most one sweep before the pair: no tracklet predicts yet, and one look back
+        /// hardly shows that it came.
         pub no_history: bool => moves_no_history,
         /// The test found it static. Of the others only `share` and `could_move` are set then.
         pub stands: bool => moves_stands,
@@ -140,20 +140,21 @@ impl Cues {
     }
 }
 
-/// Looks at a cluster's voxels in sweeps in which, by its motion, it was not there yet, and how
-/// many of them found something.
+/// Looks at a cluster's voxels in sweeps in which, by its motion, it was not there yet. What they
+/// hit was something else, unless the cluster may have been at rest there before it started: then
+/// they say neither that something else was there nor that nothing was.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Looks {
     /// Number of looks: voxels times sweeps.
     pub made: u32,
-    /// How many found something other than, perhaps, the cluster itself before it started.
+    /// How many hit something else.
     pub hits: u32,
     /// How many found nothing.
     pub empty: u32,
 }
 
 impl Looks {
-    /// Share of looks that found something: 0 to 1, below 0.5 if there were few.
+    /// Share of looks that hit something else: 0 to 1, below 0.5 if there were few.
     pub fn worn(&self) -> f32 {
         self.hits as f32 / (self.made as f32 + FEW_LOOKS)
     }

@@ -2,7 +2,8 @@
 //!
 //! Registration considers only a few sweeps. A static object may look so different from one sweep
 //! to the next that a motion explains it better; but its places were hit long before the motion
-//! would have brought it there. A car that has just pulled out was at its places before, too.
+//! would have brought it there. A car that has just pulled out was at its places before, too: such
+//! hits do not count.
 
 use super::cloud::{Cloud, DetailedCloud};
 use super::hypothesis::Hypothesis;
@@ -13,8 +14,8 @@ use crate::record::NONE;
 /// was where one is now a second ago, if it keeps its distance.
 const HISTORY: usize = 6;
 
-/// From this number of sweeps before the pair's first on, tracklets predict: those of the pair
-/// before have been observed twice.
+/// Number of sweeps before the pair's first that it takes for tracklets to predict: each must have
+/// been observed in two pairs.
 const PREDICTED: usize = 2;
 
 const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
@@ -90,6 +91,7 @@ impl History {
         of_column: &[u32],
         found: &mut [Hypothesis],
     ) {
+        // Beyond the window.
         let reach = 2.0 * first.side as f32;
         for (c, &n) in of_column[..first.side * first.side].iter().enumerate() {
             let levels = first.levels(c);
@@ -125,7 +127,7 @@ impl History {
 
 /// How far something that moves by `by` voxels per span may have come since it was at rest, at most
 /// `spans` ago, if it sped up by at most `acceleration` voxels per span²: in steps of at most one
-/// voxel, none beyond `reach` voxels. Nothing if it cannot have been at rest.
+/// voxel. Distances above `reach` voxels are cut to that. Nothing if it cannot have been at rest.
 fn since_rest(
     by: [f32; 2],
     acceleration: f32,
@@ -134,11 +136,13 @@ fn since_rest(
 ) -> impl Iterator<Item = [f32; 2]> {
     let speed = libm::hypotf(by[0], by[1]).max(f32::MIN_POSITIVE);
     let was_at_rest = speed <= acceleration * spans;
+    // It sped up just now, or at once.
     let least = 0.5 * speed * (speed / acceleration);
-    let more = (speed * spans).min(reach) - least;
-    let steps = libm::ceilf(more).max(0.0);
+    let most = speed * spans - least;
+    let [least, most] = [least, most].map(|length| length.min(reach));
+    let steps = libm::ceilf(most - least).max(0.0);
     (0..=steps as u32).filter(move |_| was_at_rest).map(move |n| {
-        let length = least + more * (n as f32 / steps.max(1.0));
+        let length = least + (most - least) * (n as f32 / steps.max(1.0));
         by.map(|b| b / speed * length)
     })
 }

@@ -88,8 +88,8 @@ impl<'a> Scans<'a> {
         self.could_move(column) < self.scaled.params.could_move_min
     }
 
-    /// Whether ground in a column may be below a moving cluster rather than road beside it.
-    pub fn may_be_below(&self, column: usize) -> bool {
+    /// Whether a column could move rather than not, as far as the encoder knows.
+    pub fn could_rather_move(&self, column: usize) -> bool {
         self.could_move(column) >= 0.0
     }
 

@@ -44,7 +44,7 @@ pub(crate) enum Pace {
     /// Vehicles that creep, at up to 4 m/s unless they overtake, and many people strolling, alone
     /// or in pairs.
     Slow,
-    /// The same with crowds of people, also on the road.
+    /// Vehicles that creep, and crowds of people, also on the road.
     Crowd,
 }
 

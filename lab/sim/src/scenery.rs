@@ -93,7 +93,7 @@ impl Scenery {
         let plan = Plan { pace, ..ego.plan(seed, duration_s) };
         let extra = match self {
             Scenery::StreetCluttered => Some(Extra::Clutter),
-            Scenery::StreetCrowded => Some(Extra::Furniture),
+            Scenery::StreetCrowded => Some(Extra::Crowded),
             _ => None,
         };
         (Scene::around(seed, &plan, duration_s, density, extra), plan.path)
@@ -153,11 +153,12 @@ mod tests {
         let standing = people.iter().filter(|o| o.path.is_static()).count();
         assert!(people.len() > 60 && 4 * standing > people.len(), "{standing} of {}", people.len());
         let near = |a: &Object| {
-            let apart = |b: &&&Object| {
+            let beside = |b: &&&Object| {
                 let [a, b] = [a, *b].map(|o| o.path.at(3.0));
                 (a.x - b.x).hypot(a.y - b.y) < 1.5
             };
-            people.iter().filter(apart).count() > 1
+            // It is beside itself, too.
+            people.iter().filter(beside).count() > 1
         };
         let close = people.iter().filter(|o| near(o)).count();
         assert!(3 * close > people.len(), "{close} of {}", people.len());

@@ -1,7 +1,8 @@
 //! What people stand around on a shopping street, on the sidewalks and where cars would park:
-//! tables under parasols, racks, crates, boards, planters, barriers, columns as thick as a person.
+//! tables under parasols, racks, crates, boards, planters, barriers, pillars as thick as a person.
 //!
-//! None of it is longer than 2 m, so that walkers find their way around it.
+//! Below head height it is made of cylinders, and of boxes shorter than 2 m: walkers keep clear of
+//! these alone ([`crate::traffic`]).
 
 use super::Yard;
 use crate::dimensions::{EDGE, ROAD_HALF};
@@ -12,7 +13,7 @@ use raywake_core::pose::Pose;
 
 impl Yard<'_> {
     /// Rows of such things on both sides of the main road.
-    pub(super) fn furnish(&mut self, x: [f64; 2]) {
+    pub(super) fn crowd(&mut self, x: [f64; 2]) {
         for side in [-1.0, 1.0] {
             self.row(x, side, [ROAD_HALF - 1.5, ROAD_HALF - 0.4]);
             self.row(x, side, [EDGE - 1.3, EDGE - 0.4]);
@@ -25,7 +26,7 @@ impl Yard<'_> {
         while at < x[1] {
             for _ in 0..self.count(1, 7) {
                 let y = side * self.rng.range(beside[0], beside[1]);
-                if !self.in_crossing(at, 1.0) {
+                if !self.in_crossing(at, 2.5) {
                     self.thing(at, y);
                 }
                 at += self.rng.range(1.0, 3.0);
@@ -42,7 +43,7 @@ impl Yard<'_> {
             5 => self.board(x, y),
             6 => self.planter(x, y),
             7 => self.barrier(x, y),
-            _ => self.column(x, y),
+            _ => self.pillar(x, y),
         }
     }
 
@@ -134,8 +135,8 @@ impl Yard<'_> {
         }
     }
 
-    /// A column about as thick as a person, or several times that.
-    fn column(&mut self, x: f64, y: f64) {
+    /// A pillar as thick as a person, or up to twice that.
+    fn pillar(&mut self, x: f64, y: f64) {
         let size = [self.rng.range(0.15, 0.6), self.rng.range(1.2, 2.8)];
         self.round(x, y, size, 0.0);
     }

@@ -58,7 +58,7 @@ pub(crate) enum Extra {
     /// That of [`crate::Scenery::StreetCluttered`].
     Clutter,
     /// That of [`crate::Scenery::StreetCrowded`].
-    Furniture,
+    Crowded,
 }
 
 /// Builds the additional background of a street.
@@ -72,7 +72,7 @@ pub(crate) fn add(
     let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
     match extra {
         Extra::Clutter => yard.clutter(extent.x),
-        Extra::Furniture => yard.furnish(extent.x),
+        Extra::Crowded => yard.crowd(extent.x),
     }
     yard.fixtures
 }

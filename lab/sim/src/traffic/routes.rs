@@ -164,7 +164,6 @@ impl Routes<'_> {
         let (sign, side) = (self.rng.sign(), self.rng.sign());
         let ([slow, fast], aside) = match self.plan.pace {
             Pace::Slow => ([0.4, 1.4], [0.8, 3.8]),
-            Pace::Crowd => ([0.4, 1.8], [-3.5, 3.8]),
             _ => ([0.8, 2.0], [1.4, 3.2]),
         };
         let speed = self.rng.range(slow, fast);
