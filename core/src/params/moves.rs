@@ -45,7 +45,7 @@ crate::params! {
              drives on their own (`eval --pairs --moving 0 --set could_move_min=-8`, `train moves \
              --only moves_no_history OUT/pairs`). On drives, those and twelve crowded \
              ones (`--drives 3 --sweeps 20 --seed 9400 --scenery street-crowded`), first pairs \
-             give 1.06, second ones 0.72. On every fifth drive, held out, \
+             give 1.07, second ones 0.98. On every fifth drive, held out, \
              the loss over pairs is 0.094 with it, 0.104 without it.";
         /// Weight of the test's finding that the cluster is static.
         pub moves_stands: f32 = 0.75, "nat", (-100 to 100), FITTED;

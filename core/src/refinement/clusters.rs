@@ -268,8 +268,7 @@ impl Clusters {
         let acceleration = scans.scaled.acceleration(scans.span_s);
         // A car may have pulled out a moment ago; a wall cannot have.
         let could_start = |c| scans.could_rather_move(c);
-        let at = (scans.first, scans.span_s);
-        history.find(at, acceleration, could_start, of_column, found);
+        history.find(scans.first, scans.span_s, acceleration, could_start, of_column, found);
         for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
             found.cues.worn = found.looks.worn();
             found.cues.fresh = found.looks.fresh();

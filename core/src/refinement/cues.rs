@@ -165,6 +165,9 @@ impl Looks {
     }
 }
 
+/// Age from which a tracklet predicts: it has been observed again.
+pub(crate) const PREDICTING_AGE: u32 = 1;
+
 /// What the tracklet of a column predicts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prediction {

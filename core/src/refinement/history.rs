@@ -6,6 +6,7 @@
 //! hits do not count.
 
 use super::cloud::{Cloud, DetailedCloud};
+use super::cues::PREDICTING_AGE;
 use super::hypothesis::Hypothesis;
 use crate::params::{CLUSTER_LEVELS_MAX, COLUMNS_MAX};
 use crate::record::NONE;
@@ -13,10 +14,6 @@ use crate::record::NONE;
 /// Number of sweeps before the pair's first that are remembered: 0.6 s at 10 Hz. The vehicle ahead
 /// was where one is now a second ago, if it keeps its distance.
 const HISTORY: usize = 6;
-
-/// Number of sweeps before the pair's first that it takes for tracklets to predict: each must have
-/// been observed in two pairs.
-const PREDICTED: usize = 2;
 
 const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
 
@@ -53,7 +50,8 @@ impl History {
 
     /// Whether there were too few sweeps before the pair's first for tracklets to predict anything.
     pub fn is_short(&self) -> bool {
-        self.held < PREDICTED
+        // As many pairs came before this one; after the first of them, tracklets have age 0.
+        self.held <= PREDICTING_AGE as usize
     }
 
     /// Remembers a sweep in place of the oldest, without the columns of what was seen to come from
@@ -85,7 +83,8 @@ impl History {
     /// `acceleration`, voxels per span².
     pub fn find(
         &self,
-        (first, span_s): (DetailedCloud, f64),
+        first: DetailedCloud,
+        span_s: f64,
         acceleration: f32,
         could_start: impl Fn(usize) -> bool,
         of_column: &[u32],

@@ -16,7 +16,7 @@ mod tests;
 
 use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile, TrackletParams};
 use crate::record::{NONE, SweepUniform};
-use crate::refinement::cues::{Cues, Prediction};
+use crate::refinement::cues::{Cues, PREDICTING_AGE, Prediction};
 use ekf::Ekf;
 use nalgebra::Matrix2;
 
@@ -149,10 +149,10 @@ impl Tracklets {
         self.now.get(self.slot_of_column[column] as usize)
     }
 
-    /// What the tracklet in a column predicts over `dt_s` seconds, voxels; `None` until it has been
-    /// observed again.
+    /// What the tracklet in a column predicts over `dt_s` seconds, voxels; `None` below
+    /// [`PREDICTING_AGE`].
     pub(crate) fn predict(&self, column: usize, dt_s: f32, voxel_m: f32) -> Option<Prediction> {
-        let ekf = self.at(column).filter(|t| t.age > 0)?.ekf;
+        let ekf = self.at(column).filter(|t| t.age >= PREDICTING_AGE)?.ekf;
         let by = ekf.velocity().0.map(|v| v * dt_s / voxel_m);
         Some(Prediction { by, certainty: ekf.certainty() })
     }

@@ -84,18 +84,14 @@ impl Scenery {
         if let Some(place) = self.place(seed) {
             return outskirts::draw(place, seed, duration_s, density);
         }
-        let (ego, pace) = match self {
-            Scenery::StreetFast => (ego.out_of_town(seed), Pace::Fast),
-            Scenery::StreetSlow => (ego, Pace::Slow),
-            Scenery::StreetCrowded => (ego, Pace::Crowd),
-            _ => (ego, Pace::Town),
+        let (ego, pace, extra) = match self {
+            Scenery::StreetFast => (ego.out_of_town(seed), Pace::Fast, None),
+            Scenery::StreetSlow => (ego, Pace::Slow, None),
+            Scenery::StreetCrowded => (ego, Pace::Crowd, Some(Extra::Crowded)),
+            Scenery::StreetCluttered => (ego, Pace::Town, Some(Extra::Cluttered)),
+            _ => (ego, Pace::Town, None),
         };
         let plan = Plan { pace, ..ego.plan(seed, duration_s) };
-        let extra = match self {
-            Scenery::StreetCluttered => Some(Extra::Clutter),
-            Scenery::StreetCrowded => Some(Extra::Crowded),
-            _ => None,
-        };
         (Scene::around(seed, &plan, duration_s, density, extra), plan.path)
     }
 }

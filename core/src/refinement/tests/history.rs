@@ -48,7 +48,7 @@ fn looks_if_started(
     }
     let motion = Motion::around([0.0; 2]).displaced([by, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find((first.all(), 0.1), acceleration, |_| could_start, &of_column, &mut found);
+    history.find(first.all(), 0.1, acceleration, |_| could_start, &of_column, &mut found);
     found[0].looks
 }
 
@@ -123,7 +123,7 @@ fn arrivals_leave_no_earlier_trace() {
     (10..10 + LENGTH).for_each(|i| of_column[i * SIDE + 20] = 0);
     let motion = Motion::around([0.0; 2]).displaced([1.0, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find((cloud(10, 0, SWEEPS).all(), 0.1), 0.0, |_| true, &of_column, &mut found);
+    history.find(cloud(10, 0, SWEEPS).all(), 0.1, 0.0, |_| true, &of_column, &mut found);
     assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
 }
 

@@ -56,7 +56,7 @@ pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rn
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extra {
     /// That of [`crate::Scenery::StreetCluttered`].
-    Clutter,
+    Cluttered,
     /// That of [`crate::Scenery::StreetCrowded`].
     Crowded,
 }
@@ -71,7 +71,7 @@ pub(crate) fn add(
 ) -> Vec<Fixture> {
     let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
     match extra {
-        Extra::Clutter => yard.clutter(extent.x),
+        Extra::Cluttered => yard.clutter(extent.x),
         Extra::Crowded => yard.crowd(extent.x),
     }
     yard.fixtures

@@ -12,7 +12,7 @@ use crate::path::Path;
 use crate::rng::Rng;
 use crate::street::Extent;
 use footprint::{Footprint, obstacle};
-use routes::Routes;
+use routes::{GROUP_M, Routes};
 use std::f64::consts::PI;
 
 type Model = fn(u32, Path, &mut Rng) -> Object;
@@ -116,7 +116,7 @@ impl Fill<'_> {
     fn group(&mut self) {
         let Some(path) = self.mover(models::pedestrian, |r| r.stroller()) else { return };
         for _ in 0..(self.rng.unit() * 5.0) as u32 {
-            let [x, y] = [0; 2].map(|_| self.rng.range(-1.5, 1.5));
+            let [x, y] = [0; 2].map(|_| self.rng.range(-GROUP_M, GROUP_M));
             self.try_add(models::pedestrian, path.clone().moved(x, y));
         }
     }

@@ -9,6 +9,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Time over which a pedestrian's turn builds up and fades, s.
 const WALKER_EASE_S: f64 = 0.4;
 
+/// How far from the first of a group the others walk, along either axis, m.
+pub(super) const GROUP_M: f64 = 1.5;
+
 /// Draws paths that meet the vehicle's during a drive.
 pub(super) struct Routes<'a> {
     pub(super) plan: &'a Plan,
@@ -143,8 +146,7 @@ impl Routes<'_> {
 
     /// Anywhere between the houses, standing there or walking in any direction.
     pub(super) fn stroller(&mut self) -> Path {
-        // Room for a group.
-        const REACH: f64 = EDGE - 2.2;
+        const REACH: f64 = EDGE - 0.7 - GROUP_M;
         let (t, x) = self.meeting();
         let [from, to] = [0; 2].map(|_| self.rng.range(-REACH, REACH));
         let speed = self.rng.range(0.4, 1.8);
