@@ -84,7 +84,7 @@ impl Fault {
             Fault::Empty => points.clear(),
             Fault::OverCapacity => {
                 let (there, wanted) = (points.len(), OVER * profile.returns());
-                points.reserve(wanted);
+                points.reserve(wanted.saturating_sub(there));
                 (there..wanted).for_each(|n| points.push(points[n - there]));
             }
             Fault::Coincident => {

@@ -81,7 +81,7 @@ pub use poses::{PoseTrack, pose_row, rigid};
 pub use recognise::recognise;
 
 /// One sweep in memory; keep it and read into it again to reuse its memory.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct SweepData {
     /// Number of the sweep's file: frame number, or timestamp in ns for Argoverse 2.
     pub frame: u64,
@@ -96,6 +96,21 @@ pub struct SweepData {
     pub twist: Twist,
     /// What the source lacks at this sweep.
     pub dropped: SourceGaps,
+}
+
+impl Clone for SweepData {
+    fn clone(&self) -> SweepData {
+        let mut copy = SweepData::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Reuses the memory of the returns, unlike a derived one.
+    fn clone_from(&mut self, from: &SweepData) {
+        let mut points = std::mem::take(&mut self.points);
+        points.clone_from(&from.points);
+        *self = SweepData { points, ..*from };
+    }
 }
 
 impl SweepData {
