@@ -227,6 +227,23 @@ impl<'a> Cluster<'a> {
         mean.value()
     }
 
+    /// The residuals at rest and of a motion, over its returns that can be seen in the other sweeps
+    /// either way, 0 if none can. Returns of the second sweep are left out: something else may have
+    /// come there.
+    pub fn own_residuals(&self, motion: &Motion) -> [f32; 2] {
+        let [mut rest, mut moved] = [Mean::default(); 2];
+        for target in self.scans.targets {
+            for s in self.samples.iter().step_by(target.stride()) {
+                let seen = |motion| self.scans.seen_residual(s, motion, target);
+                if let Some((at_rest, in_motion)) = seen(&Motion::default()).zip(seen(motion)) {
+                    rest.add_weighted(at_rest, target.stride() as f32);
+                    moved.add_weighted(in_motion, target.stride() as f32);
+                }
+            }
+        }
+        [rest.value(), moved.value()]
+    }
+
     /// The residual of its returns at rest in the second sweep alone, 0 if none can be seen.
     pub fn second_residual(&self) -> f32 {
         self.seen_in(&self.scans.targets[0], &Motion::around(self.centre)).mean.value()

@@ -1,31 +1,28 @@
 //! The clusters of a pair's first sweep: columns that touch, then their moving parts, then what
-//! those take along.
+//! goes with those (`bodies.rs`).
 
 use super::cluster::{Cluster, VisitedColumns};
 use super::cues::{ColumnCues, Cues, Looks, Prediction};
 use super::history::History;
-use super::hypothesis::{self, Hypothesis, evidence};
+use super::hypothesis::{self, Hypothesis};
 use super::motion::Motion;
 use super::scans::Scans;
-use super::segments::Segments;
+use super::segments::{Segments, agree};
 use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill, share};
 
-/// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.
-const NEIGHBOURS_MAX: usize = 8;
-
 /// The clusters and what was found about each.
 pub struct Clusters {
-    segments: Segments,
+    pub(super) segments: Segments,
     /// Cluster of each column of the first sweep's window.
-    of_column: [u32; COLUMNS_MAX],
-    found: heapless::Vec<Hypothesis, CLUSTERS_MAX>,
+    pub(super) of_column: [u32; COLUMNS_MAX],
+    pub(super) found: heapless::Vec<Hypothesis, CLUSTERS_MAX>,
     column_cues: [ColumnCues; COLUMNS_MAX],
     /// Number of columns in clusters that there was no room for.
     pub beyond: usize,
-    /// Columns that may be part of something that moves, one bit each.
-    suspects: [u64; COLUMNS_MAX.div_ceil(64)],
+    /// Columns that may be part of something that moves, or that it may only pass, one bit each.
+    pub(super) suspects: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
 impl Clusters {
@@ -82,7 +79,7 @@ impl Clusters {
         flow: impl Fn(usize) -> Flow + Copy + Sync,
         predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
-        self.segments.find(&scans, |_| true, flow);
+        self.segments.find(&scans, |_| true, |a, b| agree(&scans, flow(a), flow(b)));
         self.test_segments(team, scans, flow, predicted);
         for (n, found) in self.found.iter_mut().enumerate() {
             let columns = self.segments.columns(n);
@@ -104,6 +101,7 @@ impl Clusters {
         }
         self.absorb_fragments(scans);
         self.complete_bodies(scans, predicted);
+        self.leave_behind(scans, history);
         self.drop_immovable(scans);
         self.include_ground(scans);
         self.find_earlier_hits(scans, history);
@@ -162,7 +160,7 @@ impl Clusters {
             bits.fold(0, |bits, (n, c)| bits | u64::from(suspect(c)) << n)
         });
         let suspects = &self.suspects;
-        self.segments.find(&scans, |c| suspects[c / 64] >> (c % 64) & 1 != 0, |_| 0);
+        self.segments.find(&scans, |c| suspects[c / 64] >> (c % 64) & 1 != 0, |_, _| true);
         let whole = self.found.len();
         self.test_segments(team, scans, flow, predicted);
         let parts = &mut self.found[whole..];
@@ -189,175 +187,42 @@ impl Clusters {
         self.found.truncate(kept);
     }
 
-    /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
-    /// go with these if they fit.
-    fn absorb_fragments(&mut self, scans: Scans) {
-        let visited = &mut VisitedColumns::new();
-        self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_| 0);
-        for n in 0..self.segments.len() {
-            let columns = self.segments.columns(n);
-            let near = self.moving_neighbours(scans, columns, scans.scaled.fragment_distance);
-            if near.is_empty() {
-                continue;
-            }
-            let cluster = Cluster::new(scans, columns);
-            if cluster.extent > scans.scaled.extent_max {
-                continue;
-            }
-            if let Some(with) = self.joined(&cluster, &near, visited) {
-                columns.iter().for_each(|c| self.of_column[*c as usize] = with);
-            }
-        }
-    }
-
-    /// Lets whatever could move and touches a moving cluster go with it if its motion fits about as
-    /// well as rest: the sides of a bus slide along themselves; only its ends show the motion.
-    fn complete_bodies(
-        &mut self,
-        scans: Scans,
-        predicted: impl Fn(usize) -> Option<Prediction> + Copy,
-    ) {
-        let visited = &mut VisitedColumns::new();
-        let could_move = |c: usize| scans.could_move(c) > scans.scaled.params.body_min;
-        let part = |c: usize| could_move(c) && is_static(&self.of_column, &self.found, c);
-        self.segments.find(&scans, part, |_| 0);
-        for n in 0..self.segments.len() {
-            let columns = self.segments.columns(n);
-            let near = self.moving_neighbours(scans, columns, 1);
-            if near.is_empty() {
-                continue;
-            }
-            let rest = Cluster::new(scans, columns);
-            let static_residual = rest.static_residual(None, visited).0;
-            let with = near.iter().filter_map(|m| {
-                let body = &self.found[*m as usize];
-                hypothesis::along_with(&rest, static_residual, body, predicted, visited)
-            });
-            let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
-            // If there is no room for one more, it stays static.
-            if best.is_some_and(|best| self.found.push(best).is_ok()) {
-                let id = self.found.len() as u32 - 1;
-                columns.iter().for_each(|c| self.of_column[*c as usize] = id);
-            }
-        }
-    }
-
-    /// Takes columns that could not move out of moving clusters. A cluster consisting mostly of
-    /// such columns keeps them if it was seen to come from elsewhere: something unlike anything
-    /// learned may still move.
-    fn drop_immovable(&mut self, scans: Scans) {
-        self.found.iter_mut().for_each(|f| f.similarity = 0);
-        for c in 0..self.of_column.len() {
-            let found = self.found.get_mut(self.of_column[c] as usize);
-            if let Some(found) = found.filter(|f| f.is_dynamic) {
-                found.similarity += if scans.stays(c) { -1 } else { 1 };
-            }
-        }
-        for c in 0..self.of_column.len() {
-            let found = self.found.get(self.of_column[c] as usize);
-            if found.is_some_and(|f| f.is_dynamic && !f.may_include(&scans, c)) {
-                self.of_column[c] = NONE;
-            }
-        }
-    }
-
     /// Finds what was hit before at the places that moving clusters came to.
     fn find_earlier_hits(&mut self, scans: Scans, history: &History) {
-        let (of_column, found) = (&self.of_column, &mut self.found);
-        found.iter_mut().for_each(|f| f.looks = Looks::default());
-        let acceleration = scans.scaled.acceleration(scans.span_s);
-        // A car may have pulled out a moment ago; a wall cannot have.
-        let could_start = |c| scans.could_rather_move(c);
-        history.find(scans.first, scans.span_s, acceleration, could_start, of_column, found);
+        self.found.iter_mut().for_each(|f| f.looks = Looks::default());
+        for c in 0..scans.first.side * scans.first.side {
+            if is_moving(&self.of_column, &self.found, c) {
+                let looks = self.looks(&scans, history, c);
+                self.found[self.of_column[c] as usize].looks += looks;
+            }
+        }
         for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
             found.cues.worn = found.looks.worn();
             found.cues.fresh = found.looks.fresh();
         }
     }
 
-    /// Lets the ground below a moving cluster, where nothing else stands, go with it, unless the
-    /// encoder takes it for road beside the cluster.
-    fn include_ground(&mut self, scans: Scans) {
-        let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
-        for c in 0..side * side {
-            let found = self.found.get_mut(self.of_column[c] as usize);
-            let Some(found) = found.filter(|f| f.is_dynamic) else { continue };
-            let returns = scans.first.column(c).map(|n| scans.first.sample(n).at);
-            returns.for_each(|[x, y, _]| found.footprint.add([x, y]));
-        }
-        for (n, found) in self.found.iter().enumerate().filter(|(_, f)| f.is_dynamic) {
-            let [rows, columns] = found.footprint.cells(margin, side);
-            for (i, j) in rows.flat_map(|i| columns.clone().map(move |j| (i, j))) {
-                let column = i * side + j;
-                let of_column = &mut self.of_column[column];
-                let at = [i as f32 + 0.5, j as f32 + 0.5];
-                if *of_column == NONE
-                    && found.footprint.holds(at, margin)
-                    && scans.could_rather_move(column)
-                {
-                    *of_column = n as u32;
-                }
-            }
-        }
-    }
-
-    /// Which of the nearby moving clusters a fragment goes with.
-    fn joined(
-        &self,
-        fragment: &Cluster,
-        near: &[u32],
-        visited: &mut VisitedColumns,
-    ) -> Option<u32> {
-        let params = &fragment.scans.scaled.params;
-        let (rest, visible) = fragment.static_residual(None, visited);
-        let parent = self.of_column[fragment.columns[0] as usize];
-        let extent_min = params.remainder_ratio * self.found[parent as usize].extent;
-        let mut best = (1.0, None);
-        for m in near {
-            let found = &self.found[*m as usize];
-            let residual = fragment.residual(&found.motion, visited);
-            let is_remainder = found.parent == parent && found.extent > extent_min;
-            let hidden = visible < params.visible_ratio && residual < params.residual_bad;
-            let joins = evidence(rest, residual)
-                > params.evidence_min * params.evidence_prior_ratio
-                || hidden
-                || is_remainder && residual < rest + params.remainder_residual;
-            if joins && residual < best.0 {
-                best = (residual, Some(*m));
-            }
-        }
-        best.1
-    }
-
-    /// Moving clusters that have columns within `reach` columns of those of a fragment.
-    fn moving_neighbours(
-        &self,
-        scans: Scans,
-        columns: &[u32],
-        reach: usize,
-    ) -> heapless::Vec<u32, NEIGHBOURS_MAX> {
-        let side = scans.first.side;
-        let mut near = heapless::Vec::new();
-        for &c in columns {
-            let (i, j) = (c as usize / side, c as usize % side);
-            for a in i.saturating_sub(reach)..(i + reach + 1).min(side) {
-                for b in j.saturating_sub(reach)..(j + reach + 1).min(side) {
-                    let other = self.of_column[a * side + b];
-                    let moves = self.found.get(other as usize).is_some_and(|f| f.is_dynamic);
-                    if moves && !near.contains(&other) {
-                        // Beyond the capacity: the first ones are enough.
-                        let _ = near.push(other);
-                    }
-                }
-            }
-        }
-        near
+    /// Looks at a column of a moving cluster.
+    pub(super) fn looks(&self, scans: &Scans, history: &History, column: usize) -> Looks {
+        let (first, n) = (scans.first, self.of_column[column]);
+        let at = [column / first.side, column % first.side].map(|c| c as f32 + 0.5);
+        let by = self.found[n as usize].motion.of(at);
+        // A car may have pulled out a moment ago; a wall cannot have.
+        let could_start = scans.could_rather_move(column);
+        let acceleration = could_start.then(|| scans.scaled.acceleration(scans.span_s));
+        let is_part = |c: usize| self.of_column[c] == n;
+        history.looks(first, column, by, scans.span_s, acceleration, is_part)
     }
 }
 
 /// Whether a column is part of a static cluster.
-fn is_static(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool {
+pub fn is_static(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool {
     found.get(of_column[column] as usize).is_some_and(|f| !f.is_dynamic)
+}
+
+/// Whether a column is part of a dynamic cluster.
+pub fn is_moving(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool {
+    found.get(of_column[column] as usize).is_some_and(|f| f.is_dynamic)
 }
 
 /// Gives columns of the `parent` next to a column of its moving part to that part if their returns

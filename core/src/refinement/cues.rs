@@ -140,9 +140,9 @@ impl Cues {
     }
 }
 
-/// Looks at a cluster's voxels in sweeps in which, by its motion, it was not there yet. What they
-/// hit was something else, unless the cluster may have been at rest there before it started: then
-/// they say neither that something else was there nor that nothing was.
+/// Looks at voxels of a cluster, or of a part of it, in sweeps in which, by its motion, it was not
+/// there yet. What they hit was something else, unless the cluster may have been at rest there
+/// before it started: then they say neither that something else was there nor that nothing was.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Looks {
     /// Number of looks: voxels times sweeps.
@@ -151,6 +151,14 @@ pub struct Looks {
     pub hits: u32,
     /// How many found nothing.
     pub empty: u32,
+}
+
+impl core::ops::AddAssign for Looks {
+    fn add_assign(&mut self, other: Looks) {
+        self.made += other.made;
+        self.hits += other.hits;
+        self.empty += other.empty;
+    }
 }
 
 impl Looks {

@@ -6,10 +6,8 @@
 //! hits do not count.
 
 use super::cloud::{Cloud, DetailedCloud};
-use super::cues::PREDICTING_AGE;
-use super::hypothesis::Hypothesis;
+use super::cues::{Looks, PREDICTING_AGE};
 use crate::params::{CLUSTER_LEVELS_MAX, COLUMNS_MAX};
-use crate::record::NONE;
 
 /// Number of sweeps before the pair's first that are remembered: 0.6 s at 10 Hz. The vehicle ahead
 /// was where one is now a second ago, if it keeps its distance.
@@ -78,49 +76,44 @@ impl History {
         levels != 0 && old.peek().is_some() && old.all(unseen)
     }
 
-    /// Counts what was hit before in the columns of the moving clusters of the pair's first sweep;
-    /// the pair spans `span_s`. Columns that `could_start` may have been at rest and sped up by
-    /// `acceleration`, voxels per span².
-    pub fn find(
+    /// Looks at the voxels of a column of the pair's first sweep, which spans `span_s`, if it moves
+    /// by `by` voxels over the pair. `is_part` tells whether another column belongs to the same
+    /// cluster. What `could_start` may have been at rest and sped up by `acceleration`, voxels per
+    /// span².
+    pub fn looks(
         &self,
         first: DetailedCloud,
+        column: usize,
+        by: [f32; 2],
         span_s: f64,
-        acceleration: f32,
-        could_start: impl Fn(usize) -> bool,
-        of_column: &[u32],
-        found: &mut [Hypothesis],
-    ) {
+        could_start: Option<f32>,
+        is_part: impl Fn(usize) -> bool,
+    ) -> Looks {
+        let (mut looks, levels) = (Looks::default(), first.levels(column));
+        let at = [column / first.side, column % first.side];
+        // If what was here then is part of the cluster, it is now that much farther on.
+        let is_part = |[x, y]: [f32; 2]| {
+            let on = [at[0] as f32 + 0.5 + x, at[1] as f32 + 0.5 + y];
+            first.column_at(on).is_some_and(&is_part)
+        };
         // Beyond the window.
         let reach = 2.0 * first.side as f32;
-        for (c, &n) in of_column[..first.side * first.side].iter().enumerate() {
-            let levels = first.levels(c);
-            if n == NONE || levels == 0 {
+        for past in self.sweeps[..self.held].iter().filter(|_| levels != 0) {
+            let spans = ((first.stamp_s - past.stamp_s) / span_s) as f32;
+            if is_part(by.map(|b| spans * b)) {
                 continue;
             }
-            let Some(one) = found.get_mut(n as usize).filter(|f| f.is_dynamic) else { continue };
-            let at = [c / first.side, c % first.side];
-            let by = one.motion.of(at.map(|c| c as f32 + 0.5));
-            for past in &self.sweeps[..self.held] {
-                let spans = ((first.stamp_s - past.stamp_s) / span_s) as f32;
-                // If what was here then is part of this cluster, it is now that much farther on.
-                let is_part = |[x, y]: [f32; 2]| {
-                    let on = [at[0] as f32 + 0.5 + x, at[1] as f32 + 0.5 + y];
-                    first.column_at(on).is_some_and(|on| of_column[on] == n)
-                };
-                if is_part(by.map(|b| spans * b)) {
-                    continue;
-                }
-                let Some(were) = past.around(&first, at) else { continue };
-                let hits = (levels & were).count_ones();
-                one.looks.made += levels.count_ones();
-                one.looks.empty += (levels & !were).count_ones();
-                // What started since came less far: the hits may have been of itself.
-                let own = || since_rest(by, acceleration, spans, reach).any(is_part);
-                if hits > 0 && !(could_start(c) && own()) {
-                    one.looks.hits += hits;
-                }
+            let Some(were) = past.around(&first, at) else { continue };
+            let hits = (levels & were).count_ones();
+            looks.made += levels.count_ones();
+            looks.empty += (levels & !were).count_ones();
+            // What started since came less far: the hits may have been of itself.
+            let own = |acceleration| since_rest(by, acceleration, spans, reach).any(is_part);
+            if hits > 0 && !could_start.is_some_and(own) {
+                looks.hits += hits;
             }
         }
+        looks
     }
 }
 

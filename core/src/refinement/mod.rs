@@ -24,7 +24,9 @@
 //!    evidence.
 //! 5. A static cluster may have a moving part: columns that fit badly at rest, or that came to
 //!    where nothing was before. The remainder of the cluster, fragments next to the part and what
-//!    the encoder takes for the rest of its body may go with it ([`clusters`]).
+//!    the encoder takes for the rest of its body may go with it ([`bodies`]). A part that could
+//!    not move, as far as the encoder knows, and that shows no motion of its own where something
+//!    was hit before is taken out again: it is only passed.
 //! 6. All columns of a dynamic cluster move with it, including those that the background filter
 //!    removed or that found no match, and the ground below it ([`footprint`]), unless the encoder
 //!    takes that for road beside it. Covariances are inflated by the residual ([`refined`]).
@@ -35,6 +37,7 @@
 //! internally, lengths are in voxels ([`scaled`]).
 
 mod align;
+mod bodies;
 mod cloud;
 mod cloud_detail;
 mod cloud_ring;

@@ -13,16 +13,15 @@ impl Segments {
         Segments(DisjointSets::new())
     }
 
-    /// Finds the segments of those columns of the first sweep that may be `part` of one. `flow`
-    /// gives the match of a column, if there is one.
+    /// Finds the segments of those columns of the first sweep that may be `part` of one. Neighbours
+    /// that touch are in one segment if they may go `together`.
     pub(super) fn find(
         &mut self,
         scans: &Scans,
         part: impl Fn(usize) -> bool,
-        flow: impl Fn(usize) -> Flow,
+        together: impl Fn(usize, usize) -> bool,
     ) {
         let (cloud, side) = (scans.first, scans.first.side);
-        let disparity_max = scans.scaled.params.cluster_disparity_cells;
         self.0.start(side * side, |c| cloud.levels(c) != 0 && part(c));
         for c in 0..side * side {
             if !self.0.contains(c) {
@@ -38,10 +37,7 @@ impl Segments {
                     continue;
                 }
                 let other = (i - di) * side + b as usize;
-                if self.0.contains(other)
-                    && cloud.levels(other) & near != 0
-                    && disparity(flow(c), flow(other)) <= disparity_max
-                {
+                if self.0.contains(other) && cloud.levels(other) & near != 0 && together(c, other) {
                     self.0.join(c as u32, other as u32);
                 }
             }
@@ -60,11 +56,13 @@ impl Segments {
     }
 }
 
-/// By how many cells two matches differ along an axis, 0 if one is missing.
-fn disparity(a: Flow, b: Flow) -> u32 {
+/// Whether two columns may go together by their matches, 0 for none: these differ by few enough
+/// cells along each axis, or there is only one.
+pub fn agree(scans: &Scans, a: Flow, b: Flow) -> bool {
     if a & b & VALID == 0 {
-        return 0;
+        return true;
     }
     let (a, b) = (flow_displacement(a), flow_displacement(b));
-    a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1]))
+    let disparity = a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1]));
+    disparity <= scans.scaled.params.cluster_disparity_cells
 }

@@ -1,6 +1,6 @@
 //! Clouds, their ground and segments against naive oracles.
 
-use super::super::segments::Segments;
+use super::super::segments::{Segments, agree};
 use super::*;
 use crate::params::CLOUD_MAX;
 use std::collections::{BTreeMap, BTreeSet};
@@ -147,7 +147,7 @@ fn segments_are_what_a_flood_fill_reaches() {
             traffic: &[],
             span_s: 0.1,
         };
-        segments.find(&scans, part, |c| flows[c]);
+        segments.find(&scans, part, |a, b| agree(&scans, flows[a], flows[b]));
         let touch = |a: usize, b: usize| {
             let apart =
                 |l: usize| (0..14).any(|m| cloud.levels(b) >> m & 1 != 0 && l.abs_diff(m) <= 2);

@@ -3,8 +3,6 @@
 use super::*;
 use crate::refinement::cues::Looks;
 use crate::refinement::history::History;
-use crate::refinement::hypothesis::Hypothesis;
-use crate::refinement::motion::Motion;
 
 /// Length of a block, columns, and number of sweeps that see it.
 const LENGTH: usize = 4;
@@ -46,10 +44,23 @@ fn looks_if_started(
     for i in 0..LENGTH {
         of_column[((last - corner) as usize + i) * SIDE + 20] = 0;
     }
-    let motion = Motion::around([0.0; 2]).displaced([by, 0.0]);
-    let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find(first.all(), 0.1, acceleration, |_| could_start, &of_column, &mut found);
-    found[0].looks
+    looks_of(&history, first.all(), &of_column, by, could_start.then_some(acceleration))
+}
+
+/// The looks at all columns of a cluster that moves by `by` columns over a pair of 0.1 s.
+fn looks_of(
+    history: &History,
+    first: DetailedCloud,
+    of_column: &[u32],
+    by: f32,
+    could_start: Option<f32>,
+) -> Looks {
+    let mut looks = Looks::default();
+    let is_part = |c: usize| of_column[c] == 0;
+    for c in (0..of_column.len()).filter(|c| is_part(*c)) {
+        looks += history.looks(first, c, [by, 0.0], 0.1, could_start, is_part);
+    }
+    looks
 }
 
 #[test]
@@ -121,10 +132,8 @@ fn arrivals_leave_no_earlier_trace() {
     (0..SWEEPS).for_each(|n| history.push(cloud(10, 0, n).all(), |column| column % SIDE == 20));
     let mut of_column = vec![NONE; SIDE * SIDE];
     (10..10 + LENGTH).for_each(|i| of_column[i * SIDE + 20] = 0);
-    let motion = Motion::around([0.0; 2]).displaced([1.0, 0.0]);
-    let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find(cloud(10, 0, SWEEPS).all(), 0.1, 0.0, |_| true, &of_column, &mut found);
-    assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
+    let looks = looks_of(&history, cloud(10, 0, SWEEPS).all(), &of_column, 1.0, None);
+    assert!(looks.worn() == 0.0 && looks.fresh() > 0.5);
 }
 
 /// Whether the columns of a car say that there was no history; it moves with every sweep, and

@@ -1,6 +1,7 @@
 //! The refinement against naive oracles and on clusters with known motion.
 
 extern crate std;
+mod bodies;
 mod cloud;
 mod cloud_ring;
 mod history;
@@ -233,12 +234,7 @@ fn run(refinement: &mut Refinement, flows: &[Flow]) {
     run_with_scores(refinement, flows, None, &[]);
 }
 
-/// The same, with every tracklet predicting a displacement.
-fn run_with_prediction(refinement: &mut Refinement, flows: &[Flow], expected: Option<[f32; 2]>) {
-    run_with_scores(refinement, flows, expected, &[]);
-}
-
-/// The same with the encoder's scores.
+/// The same with the encoder's scores, and every tracklet predicting a displacement.
 fn run_with_scores(
     refinement: &mut Refinement,
     flows: &[Flow],

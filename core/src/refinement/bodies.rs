@@ -1,0 +1,208 @@
+//! What goes with a moving cluster besides the columns that were found to move, and what does not.
+
+use super::cluster::{Cluster, VisitedColumns};
+use super::clusters::{Clusters, is_moving, is_static};
+use super::cues::{Looks, Prediction};
+use super::history::History;
+use super::hypothesis::{self, evidence};
+use super::scans::Scans;
+use crate::record::NONE;
+
+/// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.
+const NEIGHBOURS_MAX: usize = 8;
+
+impl Clusters {
+    /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
+    /// go with these if they fit.
+    pub(super) fn absorb_fragments(&mut self, scans: Scans) {
+        let visited = &mut VisitedColumns::new();
+        self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            let near = self.moving_neighbours(scans, columns, scans.scaled.fragment_distance);
+            if near.is_empty() {
+                continue;
+            }
+            let cluster = Cluster::new(scans, columns);
+            if cluster.extent > scans.scaled.extent_max {
+                continue;
+            }
+            if let Some(with) = self.joined(&cluster, &near, visited) {
+                columns.iter().for_each(|c| self.of_column[*c as usize] = with);
+            }
+        }
+    }
+
+    /// Lets whatever could move and touches a moving cluster go with it if its motion fits about as
+    /// well as rest: the sides of a bus slide along themselves; only its ends show the motion.
+    pub(super) fn complete_bodies(
+        &mut self,
+        scans: Scans,
+        predicted: impl Fn(usize) -> Option<Prediction> + Copy,
+    ) {
+        let visited = &mut VisitedColumns::new();
+        let could_move = |c: usize| scans.could_move(c) > scans.scaled.params.body_min;
+        let part = |c: usize| could_move(c) && is_static(&self.of_column, &self.found, c);
+        self.segments.find(&scans, part, |_, _| true);
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            let near = self.moving_neighbours(scans, columns, 1);
+            if near.is_empty() {
+                continue;
+            }
+            let rest = Cluster::new(scans, columns);
+            let static_residual = rest.static_residual(None, visited).0;
+            let with = near.iter().filter_map(|m| {
+                let body = &self.found[*m as usize];
+                hypothesis::along_with(&rest, static_residual, body, predicted, visited)
+            });
+            let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
+            // If there is no room for one more, it stays static.
+            if best.is_some_and(|best| self.found.push(best).is_ok()) {
+                let id = self.found.len() as u32 - 1;
+                columns.iter().for_each(|c| self.of_column[*c as usize] = id);
+            }
+        }
+    }
+
+    /// Takes columns that could not move out of moving clusters. A cluster consisting mostly of
+    /// such columns keeps them if it was seen to come from elsewhere: something unlike anything
+    /// learned may still move.
+    pub(super) fn drop_immovable(&mut self, scans: Scans) {
+        self.found.iter_mut().for_each(|f| f.similarity = 0);
+        for c in 0..self.of_column.len() {
+            let found = self.found.get_mut(self.of_column[c] as usize);
+            if let Some(found) = found.filter(|f| f.is_dynamic) {
+                found.similarity += if scans.stays(c) { -1 } else { 1 };
+            }
+        }
+        for c in 0..self.of_column.len() {
+            let found = self.found.get(self.of_column[c] as usize);
+            if found.is_some_and(|f| f.is_dynamic && !f.may_include(&scans, c)) {
+                self.of_column[c] = NONE;
+            }
+        }
+    }
+
+    /// Takes out of moving clusters what they pass: parts that the encoder takes for something that
+    /// could not move, that fit the motion hardly better than rest and that, had they moved, would
+    /// have come to where something was hit before. Someone who walks along a low wall touches it,
+    /// and it slides along itself. A cluster without anything that could move is judged as a whole,
+    /// elsewhere.
+    pub(super) fn leave_behind(&mut self, scans: Scans, history: &History) {
+        if scans.scores.is_empty() {
+            return;
+        }
+        let (of_column, found) = (&self.of_column, &self.found);
+        let passed = |c: usize| is_moving(of_column, found, c) && !scans.could_rather_move(c);
+        self.segments.find(&scans, passed, |a, b| of_column[a] == of_column[b]);
+        // All are judged before any is taken out: what is left of a cluster depends on the others.
+        self.suspects.fill(0);
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            if self.is_passed(&scans, history, columns) {
+                columns.iter().for_each(|c| self.suspects[*c as usize / 64] |= 1 << (c % 64));
+            }
+        }
+        for (c, of_column) in self.of_column.iter_mut().enumerate() {
+            if self.suspects[c / 64] >> (c % 64) & 1 != 0 {
+                *of_column = NONE;
+            }
+        }
+    }
+
+    /// Whether a moving cluster only passes a part of it that could not move.
+    fn is_passed(&self, scans: &Scans, history: &History, columns: &[u32]) -> bool {
+        let params = &scans.scaled.params;
+        let mut looks = Looks::default();
+        columns.iter().for_each(|c| looks += self.looks(scans, history, *c as usize));
+        if looks.worn() <= params.passed_worn_min {
+            return false;
+        }
+        let id = self.of_column[columns[0] as usize];
+        let part = Cluster::new(*scans, columns);
+        let [rest, moved] = part.own_residuals(&self.found[id as usize].motion);
+        let mut of_cluster = self.of_column.iter().enumerate().filter(|(_, of)| **of == id);
+        evidence(rest, moved) <= params.evidence_min
+            && of_cluster.any(|(c, _)| scans.could_rather_move(c))
+    }
+
+    /// Lets the ground below a moving cluster, where nothing else stands, go with it, unless the
+    /// encoder takes it for road beside the cluster.
+    pub(super) fn include_ground(&mut self, scans: Scans) {
+        let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
+        for c in 0..side * side {
+            let found = self.found.get_mut(self.of_column[c] as usize);
+            let Some(found) = found.filter(|f| f.is_dynamic) else { continue };
+            let returns = scans.first.column(c).map(|n| scans.first.sample(n).at);
+            returns.for_each(|[x, y, _]| found.footprint.add([x, y]));
+        }
+        for (n, found) in self.found.iter().enumerate().filter(|(_, f)| f.is_dynamic) {
+            let [rows, columns] = found.footprint.cells(margin, side);
+            for (i, j) in rows.flat_map(|i| columns.clone().map(move |j| (i, j))) {
+                let column = i * side + j;
+                let of_column = &mut self.of_column[column];
+                let at = [i as f32 + 0.5, j as f32 + 0.5];
+                if *of_column == NONE
+                    && found.footprint.holds(at, margin)
+                    && scans.could_rather_move(column)
+                {
+                    *of_column = n as u32;
+                }
+            }
+        }
+    }
+
+    /// Which of the nearby moving clusters a fragment goes with.
+    fn joined(
+        &self,
+        fragment: &Cluster,
+        near: &[u32],
+        visited: &mut VisitedColumns,
+    ) -> Option<u32> {
+        let params = &fragment.scans.scaled.params;
+        let (rest, visible) = fragment.static_residual(None, visited);
+        let parent = self.of_column[fragment.columns[0] as usize];
+        let extent_min = params.remainder_ratio * self.found[parent as usize].extent;
+        let mut best = (1.0, None);
+        for m in near {
+            let found = &self.found[*m as usize];
+            let residual = fragment.residual(&found.motion, visited);
+            let is_remainder = found.parent == parent && found.extent > extent_min;
+            let hidden = visible < params.visible_ratio && residual < params.residual_bad;
+            let joins = evidence(rest, residual)
+                > params.evidence_min * params.evidence_prior_ratio
+                || hidden
+                || is_remainder && residual < rest + params.remainder_residual;
+            if joins && residual < best.0 {
+                best = (residual, Some(*m));
+            }
+        }
+        best.1
+    }
+
+    /// Moving clusters that have columns within `reach` columns of those of a fragment.
+    fn moving_neighbours(
+        &self,
+        scans: Scans,
+        columns: &[u32],
+        reach: usize,
+    ) -> heapless::Vec<u32, NEIGHBOURS_MAX> {
+        let side = scans.first.side;
+        let mut near = heapless::Vec::new();
+        for &c in columns {
+            let (i, j) = (c as usize / side, c as usize % side);
+            for a in i.saturating_sub(reach)..(i + reach + 1).min(side) {
+                for b in j.saturating_sub(reach)..(j + reach + 1).min(side) {
+                    let other = self.of_column[a * side + b];
+                    let moves = self.found.get(other as usize).is_some_and(|f| f.is_dynamic);
+                    if moves && !near.contains(&other) {
+                        // Beyond the capacity: the first ones are enough.
+                        let _ = near.push(other);
+                    }
+                }
+            }
+        }
+        near
+    }
+}
