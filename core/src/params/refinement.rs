@@ -160,7 +160,7 @@ crate::params! {
             "Someone who walks along a low wall. Three hits in as many looks are enough. Columns \
              reported as moving (`raywake-lab sim --sweeps 25`, `vlp32x2` and `hdl64`), precision \
              and recall if nothing is left behind, here and at 0.1: on residential streets \
-             (`--drives 6 --seed 8181`) 88.9 and 93.2 %, 91.0 and 92.9, 91.1 and 92.8; on slow \
+             (`--drives 6 --seed 8181`) 88.9 and 93.2 %, 90.9 and 92.9, 91.1 and 92.8; on slow \
              streets (`--drives 3 --seed 9001`) 95.8 and 93.1, 95.9 and 93.1, 95.9 and 93.1; on \
              crowded ones (`--drives 2 --seed 9001`) 98.3 and 90.0, 98.4 and 89.9, 98.4 and 89.8.";
         /// How fast what starts may speed up. What was hit where a cluster may have been at rest

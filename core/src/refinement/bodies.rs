@@ -65,7 +65,7 @@ impl Clusters {
         }
     }
 
-    /// Takes columns that could not move out of moving clusters. A cluster consisting mostly of
+    /// Takes columns below `could_move_min` out of moving clusters. A cluster consisting mostly of
     /// such columns keeps them if it was seen to come from elsewhere: something unlike anything
     /// learned may still move.
     pub(super) fn drop_immovable(&mut self, scans: Scans) {
@@ -88,15 +88,17 @@ impl Clusters {
     /// could not move, that fit the motion hardly better than rest and that, had they moved, would
     /// have come to where something was hit before. Someone who walks along a low wall touches it,
     /// and it slides along itself. A cluster without anything that could move is judged as a whole,
-    /// elsewhere.
+    /// by `worn_max`.
     pub(super) fn leave_behind(&mut self, scans: Scans, history: &History) {
+        // Nothing is known then: this saves time.
         if scans.scores.is_empty() {
             return;
         }
         let (of_column, found) = (&self.of_column, &self.found);
         let passed = |c: usize| is_moving(of_column, found, c) && !scans.could_rather_move(c);
         self.segments.find(&scans, passed, |a, b| of_column[a] == of_column[b]);
-        // All are judged before any is taken out: what is left of a cluster depends on the others.
+        // All are judged before any is taken out: looks at one leave out where the rest of its
+        // cluster was.
         self.suspects.fill(0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
@@ -124,7 +126,7 @@ impl Clusters {
         let [rest, moved] = part.own_residuals(&self.found[id as usize].motion);
         let mut of_cluster = self.of_column.iter().enumerate().filter(|(_, of)| **of == id);
         evidence(rest, moved) <= params.evidence_min
-            && of_cluster.any(|(c, _)| scans.could_rather_move(c))
+            && of_cluster.any(|(c, _)| scans.could_move(c) > 0.0)
     }
 
     /// Lets the ground below a moving cluster, where nothing else stands, go with it, unless the
@@ -195,7 +197,7 @@ impl Clusters {
             for a in i.saturating_sub(reach)..(i + reach + 1).min(side) {
                 for b in j.saturating_sub(reach)..(j + reach + 1).min(side) {
                     let other = self.of_column[a * side + b];
-                    let moves = self.found.get(other as usize).is_some_and(|f| f.is_dynamic);
+                    let moves = is_moving(&self.of_column, &self.found, a * side + b);
                     if moves && !near.contains(&other) {
                         // Beyond the capacity: the first ones are enough.
                         let _ = near.push(other);

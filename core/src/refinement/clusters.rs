@@ -21,7 +21,8 @@ pub struct Clusters {
     column_cues: [ColumnCues; COLUMNS_MAX],
     /// Number of columns in clusters that there was no room for.
     pub beyond: usize,
-    /// Columns that may be part of something that moves, or that it may only pass, one bit each.
+    /// Columns that may be part of something that moves; later, those that are left behind. One bit
+    /// each.
     pub(super) suspects: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
@@ -202,7 +203,7 @@ impl Clusters {
         }
     }
 
-    /// Looks at a column of a moving cluster.
+    /// The looks at a column of a moving cluster.
     pub(super) fn looks(&self, scans: &Scans, history: &History, column: usize) -> Looks {
         let (first, n) = (scans.first, self.of_column[column]);
         let at = [column / first.side, column % first.side].map(|c| c as f32 + 0.5);

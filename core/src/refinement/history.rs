@@ -76,20 +76,23 @@ impl History {
         levels != 0 && old.peek().is_some() && old.all(unseen)
     }
 
-    /// Looks at the voxels of a column of the pair's first sweep, which spans `span_s`, if it moves
-    /// by `by` voxels over the pair. `is_part` tells whether another column belongs to the same
-    /// cluster. What `could_start` may have been at rest and sped up by `acceleration`, voxels per
-    /// span².
+    /// The looks at the voxels of a column of the pair's first sweep, supposing that it moves by
+    /// `by` voxels over the pair, which spans `span_s`. `is_part` tells whether another column
+    /// belongs to the same cluster. It may have been at rest and sped up by `acceleration`, voxels
+    /// per span²; `None` if it cannot have started.
     pub fn looks(
         &self,
         first: DetailedCloud,
         column: usize,
         by: [f32; 2],
         span_s: f64,
-        could_start: Option<f32>,
+        acceleration: Option<f32>,
         is_part: impl Fn(usize) -> bool,
     ) -> Looks {
         let (mut looks, levels) = (Looks::default(), first.levels(column));
+        if levels == 0 {
+            return looks;
+        }
         let at = [column / first.side, column % first.side];
         // If what was here then is part of the cluster, it is now that much farther on.
         let is_part = |[x, y]: [f32; 2]| {
@@ -98,7 +101,7 @@ impl History {
         };
         // Beyond the window.
         let reach = 2.0 * first.side as f32;
-        for past in self.sweeps[..self.held].iter().filter(|_| levels != 0) {
+        for past in &self.sweeps[..self.held] {
             let spans = ((first.stamp_s - past.stamp_s) / span_s) as f32;
             if is_part(by.map(|b| spans * b)) {
                 continue;
@@ -109,7 +112,7 @@ impl History {
             looks.empty += (levels & !were).count_ones();
             // What started since came less far: the hits may have been of itself.
             let own = |acceleration| since_rest(by, acceleration, spans, reach).any(is_part);
-            if hits > 0 && !could_start.is_some_and(own) {
+            if hits > 0 && !acceleration.is_some_and(own) {
                 looks.hits += hits;
             }
         }

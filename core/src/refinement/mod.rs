@@ -22,11 +22,11 @@
 //!    out of sight count as missed, because behind a corner anything fits, except those that were
 //!    outside the window before the pair. A cluster that moved in the last sweep needs less
 //!    evidence.
-//! 5. A static cluster may have a moving part: columns that fit badly at rest, or that came to
-//!    where nothing was before. The remainder of the cluster, fragments next to the part and what
-//!    the encoder takes for the rest of its body may go with it ([`bodies`]). A part that could
-//!    not move, as far as the encoder knows, and that shows no motion of its own where something
-//!    was hit before is taken out again: it is only passed.
+//! 5. A static cluster may have a moving part ([`clusters`]): columns that fit badly at rest, or
+//!    that came to where nothing was before. The remainder of the cluster, fragments next to the
+//!    part and what the encoder takes for the rest of its body may go with it ([`bodies`]). A part
+//!    is taken out again if it could not move, as far as the encoder knows, shows no motion of its
+//!    own, and is where something was hit before: the cluster only passes it.
 //! 6. All columns of a dynamic cluster move with it, including those that the background filter
 //!    removed or that found no match, and the ground below it ([`footprint`]), unless the encoder
 //!    takes that for road beside it. Covariances are inflated by the residual ([`refined`]).

@@ -56,8 +56,8 @@ impl Segments {
     }
 }
 
-/// Whether two columns may go together by their matches, 0 for none: these differ by few enough
-/// cells along each axis, or there is only one.
+/// Whether the matches of two columns, 0 for none, let these go together: they differ by at most
+/// `cluster_disparity_cells` along each axis, or one is missing.
 pub fn agree(scans: &Scans, a: Flow, b: Flow) -> bool {
     if a & b & VALID == 0 {
         return true;

@@ -30,8 +30,8 @@ fn immovable_columns_are_dropped() {
     assert!((0..all.len()).all(|c| some[c].is_none() || all[c].is_some()));
 }
 
-/// How many columns of a `part` move at the end if the encoder gives it, or everything, a score of
-/// -1 in place of 1.
+/// How many columns of a `part` move at the end if the encoder's scores are 1 everywhere, -1 in the
+/// part alone, and -1 everywhere.
 fn moving_if_doubted(sweeps: &[Returns], part: impl Fn(usize) -> bool) -> [usize; 3] {
     let count = |of_part: i8, of_rest: i8| {
         let score = |c| [if part(c) { of_part } else { of_rest }; SCORES];

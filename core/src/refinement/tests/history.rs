@@ -53,12 +53,12 @@ fn looks_of(
     first: DetailedCloud,
     of_column: &[u32],
     by: f32,
-    could_start: Option<f32>,
+    acceleration: Option<f32>,
 ) -> Looks {
     let mut looks = Looks::default();
     let is_part = |c: usize| of_column[c] == 0;
     for c in (0..of_column.len()).filter(|c| is_part(*c)) {
-        looks += history.looks(first, c, [by, 0.0], 0.1, could_start, is_part);
+        looks += history.looks(first, c, [by, 0.0], 0.1, acceleration, is_part);
     }
     looks
 }

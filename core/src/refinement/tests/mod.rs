@@ -234,7 +234,8 @@ fn run(refinement: &mut Refinement, flows: &[Flow]) {
     run_with_scores(refinement, flows, None, &[]);
 }
 
-/// The same with the encoder's scores, and every tracklet predicting a displacement.
+/// The same with the encoder's scores, and every tracklet predicting the displacement `expected`,
+/// if there is one.
 fn run_with_scores(
     refinement: &mut Refinement,
     flows: &[Flow],

@@ -58,7 +58,7 @@ fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
 }
 
 /// All variants, in the order listed.
-pub const VARIANTS: [Variant; 29] = [
+pub const VARIANTS: [Variant; 30] = [
     of(BASE, "as given", |p| p),
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
     of("refine-2", "refined by 2 sweeps", |p| Profile { refinement_sweeps: 2, ..p }),
@@ -75,8 +75,12 @@ pub const VARIANTS: [Variant; 29] = [
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
     Variant { numbers: WeightSource::NoFilter, ..of("filter-off", "every solid column", |p| p) },
     Variant { numbers: WeightSource::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
-    of("encoder-no-veto", "the encoder keeps nothing out of clusters", |mut p| {
+    of("encoder-no-veto", "the encoder drops no column by its score alone", |mut p| {
         p.refinement.could_move_min = -8.0;
+        p
+    }),
+    of("encoder-no-passing", "nothing that is only passed is left behind", |mut p| {
+        p.refinement.passed_worn_min = 1.0;
         p
     }),
     of("encoder-no-body", "the encoder completes no body", |mut p| {
@@ -160,6 +164,7 @@ mod tests {
             "filter-off",
             "encoder-off",
             "encoder-no-veto",
+            "encoder-no-passing",
             "encoder-no-body",
             "encoder-no-cue",
             "author-constancy",
