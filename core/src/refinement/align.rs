@@ -9,7 +9,7 @@
 //! Returns are only paired with returns of the same sensor. Two scanners see a dynamic object at
 //! different times; between two sweeps of one scanner it has moved for about one period.
 
-use super::cluster::{CloudPoints, Cluster, VisitedColumns};
+use super::cluster::{CloudPoints, Cluster, ColumnSet};
 use super::motion::{Motion, TARGETS_MAX};
 use super::sample::{Mean, SurfaceWeight, minus, squared_distance};
 use super::scaled::Scaled;
@@ -83,7 +83,7 @@ impl<'a> NormalEquations<'a> {
 
 impl Cluster<'_> {
     /// Registers every `stride`-th return of the cluster, starting at `motion`.
-    pub fn align(&self, mut motion: Motion, stride: usize, visited: &mut VisitedColumns) -> Motion {
+    pub fn align(&self, mut motion: Motion, stride: usize, visited: &mut ColumnSet) -> Motion {
         let (scaled, targets) = (self.scans.scaled, self.scans.targets);
         let (targets, others) = targets.split_at(targets.len().min(REGISTERED));
         let mut seen = self.target_samples(&motion, visited);

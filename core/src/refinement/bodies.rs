@@ -1,6 +1,6 @@
 //! What goes with a moving cluster besides the columns that were found to move, and what does not.
 
-use super::cluster::{Cluster, VisitedColumns};
+use super::cluster::{Cluster, ColumnSet};
 use super::clusters::{Clusters, is_moving, is_static};
 use super::cues::{Looks, Prediction};
 use super::history::History;
@@ -15,7 +15,7 @@ impl Clusters {
     /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
     /// go with these if they fit.
     pub(super) fn absorb_fragments(&mut self, scans: Scans) {
-        let visited = &mut VisitedColumns::new();
+        let visited = &mut ColumnSet::new();
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
@@ -40,7 +40,7 @@ impl Clusters {
         scans: Scans,
         predicted: impl Fn(usize) -> Option<Prediction> + Copy,
     ) {
-        let visited = &mut VisitedColumns::new();
+        let visited = &mut ColumnSet::new();
         let could_move = |c: usize| scans.could_move(c) > scans.scaled.params.body_min;
         let part = |c: usize| could_move(c) && is_static(&self.of_column, &self.found, c);
         self.segments.find(&scans, part, |_, _| true);
@@ -99,15 +99,17 @@ impl Clusters {
         self.segments.find(&scans, passed, |a, b| of_column[a] == of_column[b]);
         // All are judged before any is taken out: looks at one leave out where the rest of its
         // cluster was.
-        self.suspects.fill(0);
+        let mut left = ColumnSet::new();
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
             if self.is_passed(&scans, history, columns) {
-                columns.iter().for_each(|c| self.suspects[*c as usize / 64] |= 1 << (c % 64));
+                for c in columns {
+                    left.insert(*c as usize);
+                }
             }
         }
         for (c, of_column) in self.of_column.iter_mut().enumerate() {
-            if self.suspects[c / 64] >> (c % 64) & 1 != 0 {
+            if left.contains(c) {
                 *of_column = NONE;
             }
         }
@@ -156,12 +158,7 @@ impl Clusters {
     }
 
     /// Which of the nearby moving clusters a fragment goes with.
-    fn joined(
-        &self,
-        fragment: &Cluster,
-        near: &[u32],
-        visited: &mut VisitedColumns,
-    ) -> Option<u32> {
+    fn joined(&self, fragment: &Cluster, near: &[u32], visited: &mut ColumnSet) -> Option<u32> {
         let params = &fragment.scans.scaled.params;
         let (rest, visible) = fragment.static_residual(None, visited);
         let parent = self.of_column[fragment.columns[0] as usize];

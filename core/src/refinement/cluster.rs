@@ -15,20 +15,25 @@ const HALF_MISSED: f32 = 0.5;
 
 pub type CloudPoints = heapless::Vec<CloudPoint, SAMPLES_MAX>;
 
-/// Columns that were visited, one bit each: small enough for the stack.
-pub struct VisitedColumns([u64; COLUMNS_MAX.div_ceil(64)]);
+/// A set of columns, one bit each: small enough for the stack.
+pub struct ColumnSet([u64; COLUMNS_MAX.div_ceil(64)]);
 
-impl VisitedColumns {
-    pub fn new() -> VisitedColumns {
-        VisitedColumns([0; COLUMNS_MAX.div_ceil(64)])
+impl ColumnSet {
+    pub fn new() -> ColumnSet {
+        ColumnSet([0; COLUMNS_MAX.div_ceil(64)])
     }
 
     /// Adds a column. Returns whether it was new.
-    fn insert(&mut self, column: usize) -> bool {
+    pub fn insert(&mut self, column: usize) -> bool {
         let (word, bit) = (&mut self.0[column / 64], 1 << (column % 64));
         let first = *word & bit == 0;
         *word |= bit;
         first
+    }
+
+    /// Whether a column is in it.
+    pub fn contains(&self, column: usize) -> bool {
+        self.0[column / 64] >> (column % 64) & 1 != 0
     }
 
     fn remove(&mut self, columns: &[u32]) {
@@ -92,7 +97,7 @@ impl<'a> Cluster<'a> {
     fn target_columns(
         &self,
         motion: &Motion,
-        visited: &mut VisitedColumns,
+        visited: &mut ColumnSet,
         list: &mut heapless::Vec<u32, TARGET_COLUMNS_MAX>,
     ) -> usize {
         let target = &self.scans.targets[0];
@@ -122,7 +127,7 @@ impl<'a> Cluster<'a> {
     }
 
     /// Returns of the second sweep where the cluster would be.
-    pub fn target_samples(&self, motion: &Motion, visited: &mut VisitedColumns) -> CloudPoints {
+    pub fn target_samples(&self, motion: &Motion, visited: &mut ColumnSet) -> CloudPoints {
         let cloud = self.scans.targets[0].cloud;
         let mut columns = heapless::Vec::new();
         let total = self.target_columns(motion, visited, &mut columns);
@@ -134,7 +139,7 @@ impl<'a> Cluster<'a> {
     /// Mean truncated residual of a motion, both ways: 0 (all returns lie on something) to 1 (none
     /// does). A return that ends up where nothing can be seen counts as missed, unless the cluster
     /// could move and most of it is seen in the second sweep: behind a corner anything fits.
-    pub fn residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
+    pub fn residual(&self, motion: &Motion, visited: &mut ColumnSet) -> f32 {
         if self.could_move {
             let (residual, visible) = self.seen_residual(motion, visited);
             if visible > self.scans.scaled.params.visible_ratio {
@@ -178,7 +183,7 @@ impl<'a> Cluster<'a> {
     }
 
     /// Adds residuals of the second sweep's returns in the first.
-    fn add_all_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
+    fn add_all_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut ColumnSet) {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
@@ -192,7 +197,7 @@ impl<'a> Cluster<'a> {
     }
 
     /// The same from the returns that can be seen.
-    fn add_seen_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
+    fn add_seen_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut ColumnSet) {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
@@ -207,7 +212,7 @@ impl<'a> Cluster<'a> {
     pub fn static_residual(
         &self,
         in_earliest: Option<SeenResidual>,
-        visited: &mut VisitedColumns,
+        visited: &mut ColumnSet,
     ) -> (f32, f32) {
         self.residual_after(in_earliest, &Motion::around(self.centre), visited)
     }
@@ -215,7 +220,7 @@ impl<'a> Cluster<'a> {
     /// The residual at rest to compare with that of a motion. It leaves out the sweeps that show
     /// little of where the cluster would have been: they may show all of it at rest, and would then
     /// contribute to that residual only.
-    pub fn compared_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
+    pub fn compared_residual(&self, motion: &Motion, visited: &mut ColumnSet) -> f32 {
         let rest = Motion::around(self.centre);
         let mut mean = Mean::default();
         for target in self.scans.targets {
@@ -262,7 +267,7 @@ impl<'a> Cluster<'a> {
 
     /// The residual of a motion over the returns that can be seen, 0 if none can, and the share of
     /// its returns that can be seen in the second sweep.
-    pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
+    pub fn seen_residual(&self, motion: &Motion, visited: &mut ColumnSet) -> (f32, f32) {
         self.residual_after(None, motion, visited)
     }
 
@@ -271,7 +276,7 @@ impl<'a> Cluster<'a> {
         &self,
         earliest: Option<SeenResidual>,
         motion: &Motion,
-        visited: &mut VisitedColumns,
+        visited: &mut ColumnSet,
     ) -> (f32, f32) {
         let mut mean = Mean::default();
         let mut visible = 0.0;

@@ -1,7 +1,7 @@
 //! The clusters of a pair's first sweep: columns that touch, then their moving parts, then what
 //! goes with those (`bodies.rs`).
 
-use super::cluster::{Cluster, VisitedColumns};
+use super::cluster::{Cluster, ColumnSet};
 use super::cues::{ColumnCues, Cues, Looks, Prediction};
 use super::history::History;
 use super::hypothesis::{self, Hypothesis};
@@ -21,9 +21,8 @@ pub struct Clusters {
     column_cues: [ColumnCues; COLUMNS_MAX],
     /// Number of columns in clusters that there was no room for.
     pub beyond: usize,
-    /// Columns that may be part of something that moves; later, those that are left behind. One bit
-    /// each.
-    pub(super) suspects: [u64; COLUMNS_MAX.div_ceil(64)],
+    /// Columns that may be part of something that moves, one bit each.
+    suspects: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
 impl Clusters {
@@ -139,7 +138,7 @@ impl Clusters {
         let _ = self.found.resize(all, Hypothesis::default());
         fill(team, 0, &mut self.found[before..], &|n| {
             let cluster = Cluster::new(scans, self.segments.columns(n));
-            hypothesis::test(cluster, flow, predicted, &mut VisitedColumns::new())
+            hypothesis::test(cluster, flow, predicted, &mut ColumnSet::new())
         });
     }
 

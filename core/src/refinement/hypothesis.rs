@@ -6,7 +6,7 @@
 //! (`evidence_prior_ratio` of [`RefinementParams`](crate::params::RefinementParams)), and even less
 //! if it is long.
 
-use super::cluster::{Cluster, VisitedColumns};
+use super::cluster::{Cluster, ColumnSet};
 use super::cues::{Cues, Looks, Prediction, Prior};
 use super::footprint::Footprint;
 use super::motion::Motion;
@@ -103,7 +103,7 @@ fn is_same(scaled: &Scaled, a: &[f32; 2], b: [f32; 2]) -> bool {
 /// The best motion so far.
 struct Trials<'a> {
     cluster: &'a Cluster<'a>,
-    visited: &'a mut VisitedColumns,
+    visited: &'a mut ColumnSet,
     tried: heapless::Vec<[f32; 2], STARTS_MAX>,
     residual: f32,
     motion: Motion,
@@ -180,7 +180,7 @@ pub fn test(
     mut cluster: Cluster,
     flow: impl Fn(usize) -> Flow,
     predicted: impl Fn(usize) -> Option<Prediction>,
-    visited: &mut VisitedColumns,
+    visited: &mut ColumnSet,
 ) -> Hypothesis {
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
@@ -251,7 +251,7 @@ pub fn along_with(
     static_residual: f32,
     body: &Hypothesis,
     predicted: impl Fn(usize) -> Option<Prediction>,
-    visited: &mut VisitedColumns,
+    visited: &mut ColumnSet,
 ) -> Option<Hypothesis> {
     let scaled = rest.scans.scaled;
     let motion = rest.align(body.motion.about(rest.centre), 1, visited);

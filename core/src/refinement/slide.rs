@@ -5,7 +5,7 @@
 //! but returns beyond the ends of what the other sweep shows are missed. This tries displacements
 //! along the direction that registration knows least about.
 
-use super::cluster::{Cluster, VisitedColumns};
+use super::cluster::{Cluster, ColumnSet};
 use super::motion::Motion;
 
 /// Number of displacements tried either way, and their spacing, voxels: 4.8 m in steps of 0.3 m.
@@ -30,7 +30,7 @@ pub fn slide(
     cluster: &Cluster,
     motion: &Motion,
     residual: f32,
-    visited: &mut VisitedColumns,
+    visited: &mut ColumnSet,
 ) -> Option<Motion> {
     let direction = side(motion).filter(|_| cluster.extent >= EXTENT_MIN)?;
     let slid = |by: f32| motion.displaced(direction.map(|d| by * d));

@@ -24,12 +24,13 @@ fn cloud(from: i32, corner: i32, n: usize) -> Kept {
 
 /// The looks at a block that is claimed to move by `by` columns per sweep and was seen at `at(n)`.
 fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks {
-    looks_if_started((0.0, true), by, at, corner)
+    looks_if_started(Some(0.0), by, at, corner)
 }
 
-/// The same if it may have sped up by `acceleration` columns per sweep², if it could start at all.
+/// The same if it may have sped up by `acceleration` columns per sweep²; `None` if it cannot have
+/// started.
 fn looks_if_started(
-    (acceleration, could_start): (f32, bool),
+    acceleration: Option<f32>,
     by: f32,
     at: impl Fn(i32) -> i32,
     corner: impl Fn(i32) -> i32,
@@ -44,7 +45,7 @@ fn looks_if_started(
     for i in 0..LENGTH {
         of_column[((last - corner) as usize + i) * SIDE + 20] = 0;
     }
-    looks_of(&history, first.all(), &of_column, by, could_start.then_some(acceleration))
+    looks_of(&history, first.all(), &of_column, by, acceleration)
 }
 
 /// The looks at all columns of a cluster that moves by `by` columns over a pair of 0.1 s.
@@ -92,17 +93,17 @@ fn nothing_is_known_where_hidden_or_without_a_sweep() {
 #[test]
 fn what_has_just_started_is_not_worn_by_itself() {
     // It stood at column 10, and moved by one column in the last sweep.
-    let start = |a, could| looks_if_started((a, could), 1.0, |n| 10 + n / 5, |_| 0);
-    let (steady, started) = (start(0.0, true), start(1.0, true));
+    let start = |a| looks_if_started(a, 1.0, |n| 10 + n / 5, |_| 0);
+    let (steady, started) = (start(Some(0.0)), start(Some(1.0)));
     assert!(steady.worn() > 0.3, "{}", steady.worn());
     assert_eq!((started.worn(), started.fresh()), (0.0, steady.fresh()));
     // At a tenth of that it cannot have been at rest, and a wall does not start.
-    assert_eq!([start(0.1, true), start(1.0, false)], [steady; 2]);
+    assert_eq!([start(Some(0.1)), start(None)], [steady; 2]);
     // Too fast: it cannot have been where it is now.
-    let standing = looks_if_started((1.0, true), 5.0, |_| 10, |_| 0);
+    let standing = looks_if_started(Some(1.0), 5.0, |_| 10, |_| 0);
     assert_eq!(standing, looks(5.0, |_| 10, |_| 0));
     // Stamps as if far apart: cut to what lies in the window, or beyond it.
-    let far = looks_if_started((1e10, true), 1e6, |_| 10, |_| 0);
+    let far = looks_if_started(Some(1e10), 1e6, |_| 10, |_| 0);
     assert_eq!((far.hits, far.empty), (far.made, 0));
 }
 

@@ -267,8 +267,13 @@ fn check_sane(found: &[Moved]) {
 
 /// What is found after some sweeps, the last two being the pair.
 fn found_in(sweeps: &[Returns], flows: &[Flow]) -> Vec<Moved> {
+    found_with_scores(sweeps, flows, &[])
+}
+
+/// The same with the encoder's scores.
+fn found_with_scores(sweeps: &[Returns], flows: &[Flow], scores: &[ColumnScores]) -> Vec<Moved> {
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-    run(&mut refinement, flows);
+    run_with_scores(&mut refinement, flows, None, scores);
     motions(&refinement)
 }

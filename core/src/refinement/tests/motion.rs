@@ -1,6 +1,6 @@
 //! Clusters with known motion.
 
-use super::super::cluster::{Cluster, VisitedColumns};
+use super::super::cluster::{Cluster, ColumnSet};
 use super::super::hypothesis::{self, Hypothesis};
 use super::super::motion::Motion;
 use super::*;
@@ -271,13 +271,13 @@ fn potential_movers_may_go_where_nothing_is_seen() {
     };
     let residual = |cluster: Cluster| {
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
-        cluster.residual(&motion, &mut VisitedColumns::new())
+        cluster.residual(&motion, &mut ColumnSet::new())
     };
     let [unknown, known] = [cluster(&[]), cluster(&could)].map(residual);
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
     // What moved before can also move.
     let moved = |_| Some(Prediction { by: [2.0, 0.0], certainty: 3.0 });
-    let found = hypothesis::test(cluster(&[]), |_| 0, moved, &mut VisitedColumns::new());
+    let found = hypothesis::test(cluster(&[]), |_| 0, moved, &mut ColumnSet::new());
     assert!(found.is_dynamic && found.cues.residual < 0.05, "{}", found.cues.residual);
 }
 
@@ -296,6 +296,6 @@ fn objects_entering_the_window_were_outside() {
         Scans { scaled, first, targets: &targets, detail, scores: &[], traffic: &[], span_s: 0.1 };
     let cluster = Cluster::new(scans, &part);
     let motion = Motion::around(cluster.centre).displaced([-8.0, 0.0]);
-    let residual = cluster.residual(&motion, &mut VisitedColumns::new());
+    let residual = cluster.residual(&motion, &mut ColumnSet::new());
     assert!(residual < 0.05, "{residual}");
 }
