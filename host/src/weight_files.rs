@@ -55,6 +55,11 @@ impl WeightFiles {
         self.filter.is_some()
     }
 
+    /// Whether there is an encoder.
+    pub fn has_encoder(&self) -> bool {
+        self.encoder.is_some()
+    }
+
     /// The same without the background filter: every solid column is foreground.
     pub fn without_filter(self) -> WeightFiles {
         WeightFiles { filter: None, ..self }

@@ -1,10 +1,34 @@
 //! Dimensions of the street, m, in the street frame: x along the main road, y left.
 
-/// Half width of the main road (a lane and a parking strip on either side).
-pub(crate) const ROAD_HALF: f64 = 5.7;
+use crate::rng::Rng;
+
 /// Half width of the crossing road.
 pub(crate) const CROSS_HALF: f64 = 4.5;
-/// Width of a sidewalk.
-pub(crate) const SIDEWALK: f64 = 4.3;
-/// Distance of a sidewalk's far edge from the main road's centre line.
-pub(crate) const EDGE: f64 = ROAD_HALF + SIDEWALK;
+
+/// Cross-section of the main road, the same on both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Section {
+    /// Half width of the road.
+    pub(crate) road_half: f64,
+    /// Width of a sidewalk.
+    pub(crate) sidewalk: f64,
+}
+
+impl Section {
+    /// A lane and a parking strip on either side, and broad sidewalks.
+    pub(crate) const WIDE: Section = Section { road_half: 5.7, sidewalk: 4.3 };
+
+    /// Two lanes without parking strips; sidewalks on which one or two people fit.
+    pub(crate) fn narrow(rng: &mut Rng) -> Section {
+        Section { road_half: rng.range(3.1, 4.6), sidewalk: rng.range(1.2, 3.0) }
+    }
+
+    pub(crate) fn has_parking(self) -> bool {
+        self.road_half >= Section::WIDE.road_half
+    }
+
+    /// Distance of a sidewalk's far edge from the road's centre line.
+    pub(crate) fn edge(self) -> f64 {
+        self.road_half + self.sidewalk
+    }
+}

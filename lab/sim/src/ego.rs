@@ -1,5 +1,6 @@
 //! Driving behaviour of the vehicle that carries the sensor.
 
+use crate::dimensions::Section;
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::FRAC_PI_2;
@@ -55,6 +56,8 @@ pub(crate) struct Plan {
     pub(crate) path: Path,
     /// x of the crossing road's centre line, m.
     pub(crate) crossing: f64,
+    /// Cross-section of the main road.
+    pub(crate) section: Section,
     /// Pace of the other traffic.
     pub(crate) pace: Pace,
 }
@@ -66,15 +69,15 @@ impl Ego {
         let mut rng = Rng::split(seed, 0);
         let crossing = rng.sign() * rng.range(18.0, 60.0);
         let start = |speed: f64| Path::from(State { x: 0.0, y: -LANE, yaw: 0.0, speed });
-        let pace = Pace::Town;
+        let on = |path, crossing| Plan { path, crossing, section: Section::WIDE, pace: Pace::Town };
         match self {
             Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
-            Ego::Standing => Plan { path: Path::stationary(0.0, -LANE, 0.0), crossing, pace },
-            Ego::Straight { speed } => Plan { path: start(speed), crossing, pace },
+            Ego::Standing => on(Path::stationary(0.0, -LANE, 0.0), crossing),
+            Ego::Straight { speed } => on(start(speed), crossing),
             Ego::StopAndGo { speed } => {
                 let path = start(speed).then(0.1 * duration_s, 0.0, 0.0);
                 let path = path.then_to_speed(0.0, 3.0, EASE_S).then(1.0, 0.0, 0.0);
-                Plan { path: path.then_to_speed(speed, 2.0, EASE_S), crossing, pace }
+                on(path.then_to_speed(speed, 2.0, EASE_S), crossing)
             }
             Ego::Turn { left, speed } => {
                 let before = (0.25 * duration_s).min(1.0);
@@ -83,7 +86,7 @@ impl Ego {
                 let path = path.then_turn(angle, radius, EASE_S);
                 // The turn ends in the right lane of the crossing road.
                 let crossing = path.end().x - LANE.copysign(angle);
-                Plan { path, crossing, pace }
+                on(path, crossing)
             }
         }
     }

@@ -3,7 +3,7 @@
 //!
 //! Street frame: x along the main road, y left, z up.
 
-use crate::dimensions::{CROSS_HALF, ROAD_HALF, SIDEWALK};
+use crate::dimensions::{CROSS_HALF, Section};
 use crate::relief::Relief;
 use crate::roughness::roughness;
 use glam::{DMat3, DQuat, DVec3};
@@ -21,6 +21,8 @@ pub struct Ground {
     valley: bool,
     /// x of the crossing road's centre line, m; `None`: no roads, no kerbs.
     crossing: Option<f64>,
+    /// Cross-section of the main road.
+    section: Section,
     /// Height of the sidewalks above the road, m.
     kerb: f64,
     /// Largest unevenness of the road, m.
@@ -45,6 +47,7 @@ impl Ground {
             planes: [DVec3::ZERO; 2],
             valley: true,
             crossing: None,
+            section: Section::WIDE,
             kerb: 0.0,
             bumps: 0.0,
             relief: None,
@@ -75,6 +78,16 @@ impl Ground {
         }
     }
 
+    /// The same ground with another main road.
+    pub(crate) fn with_section(self, section: Section) -> Ground {
+        Ground { section, ..self }
+    }
+
+    /// Cross-section of the main road.
+    pub(crate) fn section(&self) -> Section {
+        self.section
+    }
+
     /// The same ground with bumps of this height on the road (m), half as much again on the
     /// sidewalks and several times as much beyond. Only the laser sees them; whatever stands on the
     /// ground ignores them.
@@ -85,7 +98,7 @@ impl Ground {
     /// Distance into the sidewalk from its kerb, m; negative on the road.
     fn beyond_kerb(&self, x: f64, y: f64) -> f64 {
         match self.crossing {
-            Some(c) => (y.abs() - ROAD_HALF).min((x - c).abs() - CROSS_HALF),
+            Some(c) => (y.abs() - self.section.road_half).min((x - c).abs() - CROSS_HALF),
             None => -1.0,
         }
     }
@@ -126,8 +139,8 @@ impl Ground {
             met.then(|| {
                 let (contact, at) = (Contact { range, cosine: self.cosine(d) }, o + d * range);
                 let beyond = self.beyond_kerb(at.x, at.y);
-                let scale =
-                    1.0 + 0.5 * beyond.clamp(0.0, 1.0) + (beyond - SIDEWALK).clamp(0.0, 2.5);
+                let farther = (beyond - self.section.sidewalk).clamp(0.0, 2.5);
+                let scale = 1.0 + 0.5 * beyond.clamp(0.0, 1.0) + farther;
                 self.bumped(contact, at, scale)
             })
         };
@@ -151,8 +164,8 @@ impl Ground {
             *(if raised(middle) { &mut after } else { &mut before }) = middle;
         }
         let at = o + d * after;
-        let along_x =
-            at.y.abs() - ROAD_HALF < (at.x - self.crossing.unwrap_or(0.0)).abs() - CROSS_HALF;
+        let aside = (at.x - self.crossing.unwrap_or(0.0)).abs() - CROSS_HALF;
+        let along_x = at.y.abs() - self.section.road_half < aside;
         Some(Contact { range: after, cosine: if along_x { d.y.abs() } else { d.x.abs() } })
     }
 
@@ -232,8 +245,9 @@ mod tests {
         let at = |d: DVec3| o + d * g.contact(o, d).unwrap().range;
         assert!(at(down(0.0, 3.0, -1.5)).z.abs() < 1e-9, "road");
         assert!((at(down(0.0, 8.0, -1.35)).z - 0.15).abs() < 1e-9, "sidewalk");
-        let face = at(down(0.0, ROAD_HALF, -1.43));
-        assert!((face.y - ROAD_HALF).abs() < 1e-4 && (face.z - 0.07).abs() < 1e-4, "face");
+        let half = Section::WIDE.road_half;
+        let face = at(down(0.0, half, -1.43));
+        assert!((face.y - half).abs() < 1e-4 && (face.z - 0.07).abs() < 1e-4, "face");
         assert_eq!(g.height(0.0, 0.0), 0.0);
         assert_eq!(g.height(0.0, 7.0), 0.15);
     }

@@ -70,19 +70,20 @@ impl Scene {
         let slopes = [rng.range(-0.025, 0.025), rng.range(-0.025, 0.025)];
         let (across, bend) = (rng.range(-0.012, 0.012), rng.range(-20.0, 60.0));
         let ground = Ground::street(slopes, across, bend, plan.crossing, rng.range(0.08, 0.16));
-        let ground = ground.uneven(rng.range(0.004, 0.02));
+        let ground = ground.with_section(plan.section).uneven(rng.range(0.004, 0.02));
         let heading = rng.range(-std::f64::consts::PI, std::f64::consts::PI);
         let world_from_street =
             Pose::planar(rng.range(-200.0, 200.0), rng.range(-200.0, 200.0), 0.0, heading);
         let extent = street::Extent::around(&plan.path, duration_s);
-        let mut fixtures = street::build(&ground, extent, plan.crossing, &mut Rng::split(seed, 2));
+        let mut street = street::build(&ground, extent, plan.crossing, &mut Rng::split(seed, 2));
         if let Some(extra) = extra {
             let mut chance = Rng::split(seed, 9);
-            fixtures.extend(street::add(&ground, extent, plan.crossing, extra, &mut chance));
+            let more = street::add(&ground, extent, plan.crossing, extra, &mut chance);
+            street.fixtures.extend(more);
         }
         let mut chance = Rng::split(seed, 3);
-        let objects = traffic::fill(&fixtures, extent, plan, duration_s, density, &mut chance);
-        Scene { ground, fixtures, objects, world_from_street }
+        let objects = traffic::fill(&street, extent, plan, duration_s, density, &mut chance);
+        Scene { ground, fixtures: street.fixtures, objects, world_from_street }
     }
 
     /// Adds a fixture to the background; `pose` is `street_from_shape`.

@@ -1,8 +1,10 @@
 //! Kinds of scenery to drive through.
 
+use crate::dimensions::Section;
 use crate::ego::{Ego, Pace, Plan};
 use crate::outskirts::{self, Place};
 use crate::path::Path;
+use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::street::Extra;
 use std::fmt;
@@ -22,6 +24,8 @@ pub enum Scenery {
     StreetSlow,
     /// A slow one with crowds of people, standing and strolling among furniture, for tuning.
     StreetCrowded,
+    /// A narrow one, with borders of all kinds right beside the sidewalks, for training and tuning.
+    StreetNarrow,
     /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,
     /// This particular one.
@@ -43,12 +47,13 @@ impl std::error::Error for UnknownScenery {}
 
 impl Scenery {
     /// The street and its variants.
-    const STREETS: [Scenery; 5] = [
+    const STREETS: [Scenery; 6] = [
         Scenery::Street,
         Scenery::StreetCluttered,
         Scenery::StreetFast,
         Scenery::StreetSlow,
         Scenery::StreetCrowded,
+        Scenery::StreetNarrow,
     ];
 
     /// Every scenery.
@@ -65,6 +70,7 @@ impl Scenery {
             Scenery::StreetFast => "street-fast",
             Scenery::StreetSlow => "street-slow",
             Scenery::StreetCrowded => "street-crowded",
+            Scenery::StreetNarrow => "street-narrow",
             Scenery::Outskirts => "outskirts",
             Scenery::Only(place) => place.name(),
         }
@@ -91,7 +97,11 @@ impl Scenery {
             Scenery::StreetCluttered => (ego, Pace::Town, Some(Extra::Cluttered)),
             _ => (ego, Pace::Town, None),
         };
-        let plan = Plan { pace, ..ego.plan(seed, duration_s) };
+        let section = match self {
+            Scenery::StreetNarrow => Section::narrow(&mut Rng::split(seed, 11)),
+            _ => Section::WIDE,
+        };
+        let plan = Plan { pace, section, ..ego.plan(seed, duration_s) };
         (Scene::around(seed, &plan, duration_s, density, extra), plan.path)
     }
 }
@@ -136,6 +146,30 @@ mod tests {
             for object in scene.objects {
                 let alone = Scene { objects: vec![object], ..empty.clone() };
                 check_clear(&format!("{scenery:?}, seed {seed}"), &alone, more, None);
+            }
+        }
+    }
+
+    #[test]
+    fn narrow_streets_are_built_close_and_nothing_passes_through_what_stands_there() {
+        let wide = Section::WIDE;
+        for seed in 0..20 {
+            let (scene, path) = Scenery::StreetNarrow.draw(seed, Ego::Any, 6.0, 1.0);
+            let section = scene.ground.section();
+            assert!(section.edge() < wide.edge() - 2.0, "{section:?}");
+            let beside = |f: &&crate::object::Fixture| {
+                (section.edge()..section.edge() + 0.6).contains(&f.pose.translation.y.abs())
+            };
+            assert!(scene.fixtures.iter().filter(beside).count() > 10);
+            // Leaves may hang over a parked car.
+            let solid: Vec<_> =
+                scene.fixtures.iter().filter(|f| f.class != Class::Vegetation).cloned().collect();
+            let alone = Scene { objects: Vec::new(), ..scene.clone() };
+            let ego = Some((&path, [4.6, 1.9, 2.0]));
+            check_clear("the vehicle", &alone, &solid, ego);
+            for object in &scene.objects {
+                let alone = Scene { objects: vec![object.clone()], ..alone.clone() };
+                check_clear(&format!("seed {seed}"), &alone, &solid, None);
             }
         }
     }

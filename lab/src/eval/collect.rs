@@ -8,7 +8,9 @@ use crate::labels::trajectory::MOVING_MPS;
 use crate::labels::{Motion, View};
 use crate::simulate::truth::PointTruth;
 use glam::DVec3;
+use raywake::backend::Tables;
 use raywake::engine::Pair;
+use raywake_core::encoder::{Encoder, could_move};
 use raywake_core::frame::{Window, place};
 use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
@@ -17,6 +19,7 @@ use raywake_core::record::{Column, NONE, SweepUniform};
 use raywake_core::stages::background_filter::score;
 use raywake_core::stages::grid::shift::shift;
 use raywake_core::sweep::Rig;
+use raywake_core::team::SingleThread;
 use raywake_io::source::SweepData;
 
 /// A copy of a pair, for another thread.
@@ -75,6 +78,8 @@ pub struct Collector<'a> {
     rig: Rig,
     /// Table of the background filter.
     filter: Vec<i32>,
+    /// Without weights if the run has none.
+    encoder: Box<Encoder>,
     view: View,
     /// How far boxes are extended beyond their sides, m.
     margin_m: f64,
@@ -92,7 +97,7 @@ impl<'a> Collector<'a> {
         profile: Profile,
         rig: Rig,
         start: Pose,
-        filter: Vec<i32>,
+        tables: Tables,
         objects: &'a Objects,
         view: View,
         margin_m: f64,
@@ -100,7 +105,21 @@ impl<'a> Collector<'a> {
         let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
         let (before, reported_static) =
             (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
-        Collector { profile, rig, filter, view, margin_m, objects, grid, before, reported_static }
+        let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
+        encoder.set_weights(tables.encoder.as_deref());
+        let filter = tables.filter;
+        Collector {
+            profile,
+            rig,
+            filter,
+            encoder,
+            view,
+            margin_m,
+            objects,
+            grid,
+            before,
+            reported_static,
+        }
     }
 
     /// Edge of a column, m.
@@ -120,6 +139,12 @@ impl<'a> Collector<'a> {
     pub fn rows(&mut self, seen: &PairData, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
         let columns = self.grid.columns.len();
+        self.encoder.keep(
+            &self.grid.columns,
+            self.grid.step.side as usize,
+            [window.corner[0], window.corner[1]],
+        );
+        self.encoder.encode(&SingleThread);
         let owners = exact.map(|returns| owners(&self.grid.of_point, returns, columns));
         let next = place(&self.profile, &self.rig, &seen.then, Some(window.lattice_origin));
         let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|a| next.corner[a] - window.corner[a]);
@@ -140,9 +165,13 @@ impl<'a> Collector<'a> {
             };
             let (here, column) = (column(&window), column(&next));
             let occupied = self.before[column][0] >> 16;
-            let score = score(&step, &self.filter, &self.before, column);
-            let row = self.row(seen, flow, owner, occupied.count_ones() as u8, score);
-            let row = Row { below: hit == Some(None) && owner.is_some(), ..row };
+            let row = Row {
+                below: hit == Some(None) && owner.is_some(),
+                voxels: occupied.count_ones() as u8,
+                score: score(&step, &self.filter, &self.before, column),
+                encoder_score: self.encoder.scores().get(here).map_or(0.0, could_move),
+                ..self.row(seen, flow, owner)
+            };
             self.reported_static[here] = !row.is_reported_moving();
             rows.push(row);
         }
@@ -161,14 +190,7 @@ impl<'a> Collector<'a> {
         seen.points.iter().zip(&self.grid.of_point).map(moving).collect()
     }
 
-    fn row(
-        &self,
-        seen: &PairData,
-        flow: &ColumnFlow,
-        object: Option<&Present>,
-        voxels: u8,
-        score: i32,
-    ) -> Row {
+    fn row(&self, seen: &PairData, flow: &ColumnFlow, object: Option<&Present>) -> Row {
         let [x, y] = flow.position_vehicle_m;
         let Displacements { truth, smooth, carried, rounded, in_view } =
             self.displacements(seen, flat(flow), object);
@@ -185,8 +207,6 @@ impl<'a> Collector<'a> {
             in_view,
             motion: object.map_or(0, |p| motion(p.motion)),
             mover_m: Present::mover_m(self.present(seen), flat(flow)),
-            voxels,
-            score,
             basis: flow.basis as u8,
             flow_x: flow.displacement_m[0],
             flow_y: flow.displacement_m[1],
@@ -272,8 +292,9 @@ mod tests {
     use super::*;
     use crate::eval::row::CLASSES;
     use crate::labels::{Kind, Labels, Track};
+    use raywake_core::encoder;
     use raywake_core::output::FlowBasis;
-    use raywake_core::stages::background_filter::TABLE_WORDS;
+    use raywake_core::stages::occupancy_constancy;
     use raywake_core::sweep::Point;
     use raywake_io::source::Source;
     use raywake_io::source::simulated::Simulated;
@@ -314,10 +335,16 @@ mod tests {
         let points = seen.map(|(position, ..)| Point { position, ..Point::default() }).to_vec();
         let first = SweepData { points, world_from_vehicle: now, ..SweepData::default() };
         let profile = Profile::hdl64();
-        let filter = vec![0; TABLE_WORDS];
+        let tables = Tables::load(
+            &profile,
+            None,
+            occupancy_constancy::shipped(profile.frame),
+            Some(encoder::SHIPPED),
+        )
+        .unwrap();
         let rig = source.rig().clone();
         let mut collector =
-            Collector::new(profile, rig.clone(), now, filter, &objects, View::All, 0.0);
+            Collector::new(profile, rig.clone(), now, tables, &objects, View::All, 0.0);
         let window = collector.grid.sweep(&rig, &first.sweep());
         let column = |n: usize| {
             let column = collector.grid.of_point[n] as i32;
@@ -337,6 +364,7 @@ mod tests {
         let rows = collector.rows(&seen, Some(&truth));
         assert_eq!(classes(&rows), ["Truck", "Truck", "Background", "Background"]);
         assert!(rows.iter().map(|r| r.below).eq([true, false, false, false]));
+        assert!(rows.iter().all(|r| r.score == 0 && r.encoder_score != 0.0));
         let motion: Vec<_> = rows.iter().map(|r| (r.motion, r.true_x.hypot(r.true_y))).collect();
         // The street slopes a little.
         for (class, by) in &motion[..2] {

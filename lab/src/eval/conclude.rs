@@ -8,6 +8,7 @@ use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::moving::{self, ColumnVerdicts, FirstSights, MovesReliability};
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
+use super::tables::Rejection;
 use super::tally::Tally;
 use super::{PAIRS, figures, flow_tables, read_rows, return_tables, tables};
 use crate::labels::CAMERA_DEG;
@@ -103,11 +104,16 @@ fn of_boxes(report: &mut Report, drives: &[Facts], evidence: &Evidence, settings
         .table(calibration::table(calibration))
         .chart(calibration::reliability(calibration));
     returns(report, drives);
-    let curve = tally.filter().filter(|_| settings.weights.has_filter());
+    let refines = settings.profile.refinement_sweeps > 0;
+    let curves = Rejection {
+        filter: tally.filter().filter(|_| settings.weights.has_filter()),
+        encoder: tally.encoder().filter(|_| refines && settings.weights.has_encoder()),
+        could_move_min: f64::from(settings.profile.refinement.could_move_min),
+    };
     report
         .section("Background filter")
-        .table(tables::filter(curve.as_ref()))
-        .chart(figures::precision_recall(curve.as_ref()));
+        .table(tables::rejection(&curves))
+        .chart(figures::precision_recall(&curves));
 }
 
 fn raw_flow(report: &mut Report, tallies: Tallies, cell_m: f64) {

@@ -237,11 +237,11 @@ impl<'a> Judges<'a> {
         semantic: Option<Semantic>,
     ) -> Result<Judges<'a>, Error> {
         let (profile, view, margin_m) = (&settings.profile, labels.view, settings.margin_m);
-        let filter = settings.weights.tables(profile)?.filter;
+        let tables = settings.weights.tables(profile)?;
         let (rig, start) = (source.rig().clone(), source.pose(0));
         Ok(Judges {
             points: Points::new(view, rig.ground_m, margin_m, profile.voxel_m),
-            collector: Collector::new(profile.clone(), rig, start, filter, objects, view, margin_m),
+            collector: Collector::new(profile.clone(), rig, start, tables, objects, view, margin_m),
             returns: ReturnVerdicts::new(view, margin_m, semantic),
             exact: Exact::of(path),
             panels: Panels::default(),

@@ -3,7 +3,7 @@
 use super::facts::Facts;
 use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::statistics::{Sorted, Weight};
-use super::tables::{GRID, RECALL, stages};
+use super::tables::{GRID, RECALL, Rejection, stages};
 use super::tally::{SETTLED, Tally};
 use crate::curve::{Curve, OperatingPoint};
 use crate::report::{
@@ -35,27 +35,30 @@ fn title(group: ClassGroup, motion: MotionGroup) -> String {
     }
 }
 
-/// Figure 3.6: precision over recall of the background filter.
-pub fn precision_recall(curve: Option<&Curve>) -> Chart {
+/// Figure 3.6: precision over recall of the background filter, and of the encoder.
+pub fn precision_recall(curves: &Rejection) -> Chart {
     let mark =
         |p: OperatingPoint, label: &str| Mark { at: [p.recall, p.precision], label: label.into() };
-    let series = curve.map(|curve| {
+    let series = |name: &str, curve: &Curve, own: f64| {
         let all: Vec<_> = curve.points().collect();
         let thin = all.len().div_ceil(4 * POINTS).max(1);
         Series {
-            name: "background filter".into(),
+            name: name.into(),
             points: all.iter().step_by(thin).map(|p| [p.recall, p.precision]).collect(),
             style: Style::Line,
-            marks: vec![mark(curve.above(0.0), "shipped"), mark(curve.at_recall(RECALL), "95 %")],
+            marks: vec![mark(curve.above(own), "shipped"), mark(curve.at_recall(RECALL), "95 %")],
         }
-    });
+    };
     let mut lines = Lines::new(
         Axis::new("recall of labelled columns").range(0.0, 1.0),
         Axis::new("precision").range(0.0, 1.0),
     );
-    lines.series.extend(series);
+    let filter = curves.filter.iter().map(|c| series("background filter", c, 0.0));
+    let encoder = curves.encoder.iter().map(|c| series("encoder", c, curves.could_move_min));
+    lines.series.extend(filter.chain(encoder));
     let caption = "As figure 3.6 of the dissertation: precision and recall of the background \
-        filter over solid columns in view, for every threshold; foreground is the positive class.";
+        filter over solid columns in view, for every threshold; foreground is the positive class. \
+        The encoder is judged by its score of what could move.";
     Chart::new("figure-3-6", caption, Plot::Lines(lines))
 }
 

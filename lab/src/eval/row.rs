@@ -143,6 +143,8 @@ row! {
     voxels: u8,
     /// Score of the background filter, in the weights' integers; foreground above 0.
     score: i32,
+    /// The encoder's score of what could move against what could not, nat; 0 without an encoder.
+    encoder_score: f32,
     /// [`raywake_core::output::FlowBasis`]: 0 background, 1 unmatched, 2 matched, 3 joined.
     basis: u8,
     /// Estimated displacement over ground until the next sweep, world axes, m.

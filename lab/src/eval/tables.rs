@@ -82,24 +82,41 @@ fn published(group: ClassGroup, count: u64, numbers: &[(f64, usize)]) -> TableRo
     TableRow::reference(cells.chain(rest).take(TRACKLETS.len()))
 }
 
-/// The filter at its own threshold and at the dissertation's recall.
-pub fn filter(curve: Option<&Curve>) -> Table {
-    let row = |name: &str, p: Option<OperatingPoint>| {
-        let values = p.map_or([f64::NAN; 3], |p| [p.recall, p.background_accuracy, p.precision]);
-        TableRow::new(
-            [Cell::from(name)].into_iter().chain(values.map(|v| Cell::Number(100.0 * v, 1))),
-        )
+/// How well the background is rejected at every threshold; `None` without a filter or encoder, or
+/// if nothing is labelled, or everything is.
+pub struct Rejection {
+    pub filter: Option<Curve>,
+    pub encoder: Option<Curve>,
+    /// The encoder's threshold, nat.
+    pub could_move_min: f64,
+}
+
+/// The background filter and the encoder, each at its own threshold and at the dissertation's
+/// recall.
+pub fn rejection(curves: &Rejection) -> Table {
+    let row = |name: &str, at: &str, p: OperatingPoint| {
+        let values = [p.recall, p.background_accuracy, p.precision];
+        let names = [name, at].map(Cell::from);
+        TableRow::new(names.into_iter().chain(values.map(|v| Cell::Number(100.0 * v, 1))))
     };
-    let dissertation = ["dissertation".into(), Cell::Number(95.0, 1), Cell::Number(74.5, 1)];
-    let rows = vec![
-        row("threshold of the weights", curve.map(|c| c.above(0.0))),
-        row("at 95 % recall", curve.map(|c| c.at_recall(RECALL))),
-        TableRow::reference(dissertation.into_iter().chain([Cell::Empty])),
-    ];
-    let columns = ["Operating point", "Recall, %", "Background accuracy, %", "Precision, %"];
-    let caption = "Background filter over solid columns in view. Foreground is whatever lies in a \
-        labelled box; background accuracy is the share of the other columns that are rejected.";
-    Table::new("filter", caption, &columns, rows)
+    let rows = |name, curve: &Option<Curve>, own: &str, threshold: f64| {
+        let points = curve.as_ref().map(|c| {
+            let at_recall = row(name, "at 95 % recall", c.at_recall(RECALL));
+            [row(name, own, c.above(threshold)), at_recall]
+        });
+        points.into_iter().flatten()
+    };
+    let printed = [95.0, 74.5].map(|n| Cell::Number(n, 1));
+    let printed = ["dissertation".into(), "at 95 % recall".into()].into_iter().chain(printed);
+    let filter = rows("background filter", &curves.filter, "threshold of the weights", 0.0);
+    let encoder = rows("encoder", &curves.encoder, "`could_move_min`", curves.could_move_min);
+    let printed = TableRow::reference(printed.chain([Cell::Empty]));
+    let rows = filter.chain(encoder).chain([printed]).collect();
+    let columns = ["By", "Threshold", "Recall, %", "Background accuracy, %", "Precision, %"];
+    let caption = "Rejection of the background over solid columns in view. Foreground is whatever \
+        lies in a labelled box, moving or not; background accuracy is the share of the other \
+        columns that are rejected. The encoder is judged by its score of what could move.";
+    Table::new("rejection", caption, &columns, rows)
 }
 
 /// Name, among the stages, of the total time.
@@ -210,4 +227,33 @@ pub fn times(drives: &[Facts]) -> Table {
         "Dissertation: standard deviation, ms",
     ];
     Table::new("table-3-3", caption, &columns, steps.chain(stages).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ways_of_rejection_at_their_own_thresholds() {
+        let curve = |scores: [f64; 4]| {
+            let labelled = [true, true, false, false];
+            Curve::of(scores.into_iter().zip(labelled).map(|(score, of)| (score, of, 1.0)))
+        };
+        let encoder = curve([3.0, -6.0, -5.0, -8.0]);
+        let both =
+            Rejection { filter: curve([2.0, 1.0, 1.5, -1.0]), encoder, could_move_min: -5.5 };
+        let shown = |of: &Rejection| -> Vec<Vec<String>> {
+            let rows = rejection(of).rows;
+            rows.iter().map(|r| r.cells.iter().map(|c| format!("{c:?}")).collect()).collect()
+        };
+        let all = shown(&both);
+        let point = |recall: f64, accuracy: f64, precision: f64| {
+            [recall, accuracy, precision].map(|n| format!("{:?}", Cell::Number(n, 1)))
+        };
+        assert_eq!(all.len(), 5, "{all:?}");
+        assert_eq!(all[0][2..4], point(100.0, 50.0, 0.0)[..2]);
+        assert_eq!(all[2][2..], point(50.0, 50.0, 50.0));
+        assert_eq!(all[3][2..4], point(100.0, 50.0, 0.0)[..2]);
+        assert_eq!(shown(&Rejection { encoder: None, ..both }), [&all[..2], &all[4..]].concat());
+    }
 }

@@ -36,8 +36,9 @@ pub struct Tally {
     /// Solid columns in view, and those with a settled tracklet.
     columns: [[u64; 3]; COUNT],
     covered: [[u64; 3]; COUNT],
-    /// Filter score of every solid column in view, and whether it is labelled.
-    scores: Vec<(i32, bool)>,
+    /// Scores of every solid column in view, and whether it is labelled: the filter's, and the
+    /// encoder's of what could move.
+    scores: Vec<(i32, f32, bool)>,
     /// Rows that do not count because labels are incomplete there.
     pub out_of_view: u64,
     /// Rows that do not count because they are of the ground below an object.
@@ -68,7 +69,7 @@ impl Tally {
             return;
         }
         let (class, motion) = (row.class as usize, row.motion as usize);
-        self.scores.push((row.score, row.class > 0));
+        self.scores.push((row.score, row.encoder_score, row.class > 0));
         let (raw, smooth) = ([row.true_x, row.true_y], [row.smooth_x, row.smooth_y]);
         for (n, estimate) in Estimate::ALL.iter().enumerate() {
             // Of the background, by far the largest part, only what is shown is kept.
@@ -109,7 +110,12 @@ impl Tally {
     /// The filter's operating points at every threshold (figure 3.6); `None` if nothing is
     /// labelled, or everything is.
     pub fn filter(&self) -> Option<Curve> {
-        Curve::of(self.scores.iter().map(|s| (f64::from(s.0), s.1, 1.0)))
+        Curve::of(self.scores.iter().map(|s| (f64::from(s.0), s.2, 1.0)))
+    }
+
+    /// The same for the encoder's score of what could move.
+    pub fn encoder(&self) -> Option<Curve> {
+        Curve::of(self.scores.iter().map(|s| (f64::from(s.1), s.2, 1.0)))
     }
 
     /// Errors of displacement, m.

@@ -4,7 +4,7 @@
 //! truth, then a checksum of everything.
 
 use super::object::{Moment, Object};
-use super::simulated::{Sets, Wanted, rule, simulate};
+use super::simulated::{Drives, Sets, Wanted, rule, simulate};
 use crate::labels::Kind;
 use glam::DVec3;
 use raywake_core::digest::Digest;
@@ -15,27 +15,27 @@ use std::io::Write;
 use std::path::Path;
 
 /// Version of the simulator and the format: files of another version are regenerated.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
-/// The sets of a seed, read from a folder, or simulated and stored there.
+/// The sets of these drives, read from a folder, or simulated and stored there.
 ///
 /// Fails if the folder cannot be written. A file that is damaged or was made from another request
 /// is regenerated.
-pub fn sets(folder: &Path, seed: u64, wanted: &Wanted) -> Result<Sets, Error> {
-    let path = folder.join(format!("objects-{seed}.bin"));
-    let key = key(seed, wanted);
+pub fn sets(folder: &Path, drives: &Drives, wanted: &Wanted) -> Result<Sets, Error> {
+    let path = folder.join(format!("objects-{}.bin", drives.seed));
+    let key = key(drives, wanted);
     if let Some(sets) = std::fs::read(&path).ok().and_then(|bytes| read(&bytes, key)) {
         return Ok(sets);
     }
-    let sets = simulate(seed, wanted);
+    let sets = simulate(drives, wanted);
     atomic::create_folder(folder)?;
     atomic::write(&path, |out| out.write_all(&write(&sets, key)))?;
     Ok(sets)
 }
 
 /// Digest of everything that decides the objects.
-pub fn key(seed: u64, wanted: &Wanted) -> u64 {
-    Digest::of(format!("{VERSION} {seed} {wanted:?} {}", rule()).as_bytes())
+pub fn key(drives: &Drives, wanted: &Wanted) -> u64 {
+    Digest::of(format!("{VERSION} {drives:?} {wanted:?} {}", rule()).as_bytes())
 }
 
 fn write(sets: &Sets, key: u64) -> Vec<u8> {

@@ -30,8 +30,9 @@ use raywake::args::{FlowChoice, FrontEndKind};
 use raywake::error::RunError;
 use raywake_io::Error;
 use raywake_objects::estimate::Estimator;
+use raywake_sim::UnknownRig;
 use recorded::Recorded;
-use simulated::Wanted;
+use simulated::{Drives, Wanted};
 use std::path::PathBuf;
 use std::time::Instant;
 use tables::Set;
@@ -49,6 +50,10 @@ pub struct Args {
     /// Seed of the simulated sets: 1 to 6 are for choosing parameters
     #[arg(long, default_value_t = 7)]
     seed: u64,
+    /// Rig of the simulated sets, as for `sim`: `hdl32x4-full` is the dissertation's at the
+    /// devices' full rate
+    #[arg(long, value_name = "RIG", default_value = "hdl32x4")]
+    sensor: String,
     /// Objects at a time [default: the number of threads the machine runs at once]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
@@ -71,6 +76,8 @@ struct Objects {
 /// Fails if a drive cannot be read or the report cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     let jobs = args.jobs.unwrap_or_else(cores);
+    let rig = args.sensor.parse().map_err(|e: UnknownRig| Error::Usage(e.to_string()))?;
+    let simulated_drives = Drives { seed: args.seed, rig };
     let begin = Instant::now();
     let mut drives = Vec::new();
     for path in &args.drives {
@@ -84,7 +91,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         );
         drives.push(drive);
     }
-    let simulated = kept::sets(&args.out, args.seed, &Wanted::full())?;
+    let simulated = kept::sets(&args.out, &simulated_drives, &Wanted::full())?;
     eprintln!("objects: {:.1} s", begin.elapsed().as_secs_f64());
     let found = found(args, &drives, jobs)?;
     let mut labels = Errors::default();
@@ -155,6 +162,7 @@ fn conclude(
     let mut report = Report::new("Tracks with shape", "chapter 2, perfect segmentation");
     headlines(&mut report, sets);
     report.fact("Seed", &args.seed.to_string());
+    report.fact("Rig of the simulated sets", &args.sensor);
     for set in sets {
         report.fact("Set", &set.about());
     }
@@ -254,7 +262,7 @@ fn fault_case<'a>(all: &'a [Objects], sets: &[Set]) -> Option<&'a Object> {
 /// Every convention that decides what is counted.
 fn choices() -> String {
     format!(
-        "Simulated objects are seen by four HDL-32E from a moving vehicle with exact poses: {}\n\n\
+        "Simulated objects are seen from a moving vehicle with exact poses: {}\n\n\
          Recorded ones are the returns in labelled boxes above the ground, each at its own time; \
          the truth of moving ones is their smoothed labels, whose own errors count as ours.\n\n\
          The baseline's states before it has found out which way an object faces are revised, as \

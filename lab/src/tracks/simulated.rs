@@ -1,4 +1,4 @@
-//! Objects of simulated drives past parked and moving traffic, seen by four HDL-32E.
+//! Objects of simulated drives past parked and moving traffic.
 
 use super::object::{Moment, Object, Seen, mark_passed_returns};
 use crate::labels::{Kind, kind, turn};
@@ -38,6 +38,15 @@ const STEP_S: f64 = 5e-4;
 
 /// Maximum number of drives laid out.
 const DRIVES_MAX: u64 = 400;
+
+/// Drives to take objects from.
+#[derive(Clone, Debug)]
+pub struct Drives {
+    /// Determines all of them.
+    pub seed: u64,
+    /// What sees the objects.
+    pub rig: SensorRig,
+}
 
 /// Numbers of objects wanted.
 #[derive(Clone, Debug)]
@@ -108,7 +117,7 @@ fn of_class(class: raywake_sim::Class) -> Kind {
     kind(class_name(class)).unwrap_or(Kind::Other)
 }
 
-/// Objects of the drives of a seed, stationary and moving.
+/// Objects of some drives, stationary and moving.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sets {
     /// Parked vehicles.
@@ -117,16 +126,16 @@ pub struct Sets {
     pub moving: Vec<Object>,
 }
 
-/// Simulates drives from a seed until there are as many objects as wanted, the same on every run;
-/// or fewer if [`DRIVES_MAX`] drives do not have them.
-pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
+/// Simulates drives until there are as many objects as wanted, the same on every run; or fewer if
+/// [`DRIVES_MAX`] drives do not have them.
+pub fn simulate(drives: &Drives, wanted: &Wanted) -> Sets {
     let mut wanted = wanted.clone();
     let mut sets = Sets { stationary: Vec::new(), moving: Vec::new() };
     for number in 0..DRIVES_MAX {
         if wanted.is_satisfied() {
             break;
         }
-        let drive = drive(seed, number);
+        let drive = drive(drives, number);
         if !wanted.may_have(&drive) {
             continue;
         }
@@ -147,16 +156,17 @@ pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
     sets
 }
 
-/// Drive `number` of a seed: three in five go straight on, the others round a corner or stop and
+/// Drive `number`: three in five go straight on, the others round a corner or stop and
 /// go.
-fn drive(seed: u64, number: u64) -> Drive {
-    let mut rng = Rng::split(seed, number);
+fn drive(drives: &Drives, number: u64) -> Drive {
+    let mut rng = Rng::split(drives.seed, number);
     let ego = match (rng.unit() * 5.0) as u32 {
         0..3 => Ego::Straight { speed: rng.range(4.0, 10.0) },
         3 => Ego::turn(&mut rng),
         _ => Ego::stop_and_go(&mut rng),
     };
-    let options = Options { sweeps: SWEEPS, ego, rig: SensorRig::hdl32x4(), ..Options::default() };
+    let rig = drives.rig.clone();
+    let options = Options { sweeps: SWEEPS, ego, rig, ..Options::default() };
     Drive::new(rng.bits(), options)
 }
 

@@ -1,11 +1,12 @@
 use super::evaluate::{OURS, Outcome, evaluate, histories, methods};
 use super::kept;
 use super::object::{centroid, moment_at};
-use super::simulated::{Sets, Wanted, simulate};
+use super::simulated::{Drives, Sets, Wanted, simulate};
 use super::tables;
 use crate::labels::Kind;
 use crate::scratch::Scratch;
 use glam::DVec3;
+use raywake_sim::SensorRig;
 use std::fs;
 use std::sync::OnceLock;
 
@@ -14,10 +15,14 @@ fn wanted() -> Wanted {
     Wanted { parked: 5, moving: moving.map(|kind| (kind, 1)).into() }
 }
 
+fn drives(seed: u64) -> Drives {
+    Drives { seed, rig: SensorRig::hdl32x4() }
+}
+
 /// Sets from one drive; casting them takes seconds.
 fn small() -> &'static Sets {
     static SETS: OnceLock<Sets> = OnceLock::new();
-    SETS.get_or_init(|| simulate(1, &wanted()))
+    SETS.get_or_init(|| simulate(&drives(1), &wanted()))
 }
 
 #[test]
@@ -41,17 +46,19 @@ fn sets_are_as_requested_and_reproducible() {
     let scratch = Scratch::new();
     // Simulated anew, then read.
     for _ in 0..2 {
-        assert!(kept::sets(scratch.path(), 1, &wanted()).unwrap() == *sets);
+        assert!(kept::sets(scratch.path(), &drives(1), &wanted()).unwrap() == *sets);
     }
     let file = scratch.path().join("objects-1.bin");
     let whole = fs::read(&file).unwrap();
-    assert!(kept::read(&whole, kept::key(1, &wanted())).is_some());
+    assert!(kept::read(&whole, kept::key(&drives(1), &wanted())).is_some());
     let mut damaged = whole.clone();
     damaged[whole.len() / 2] ^= 1;
     for bad in [&damaged[..], &whole[..whole.len() / 2], &[]] {
-        assert!(kept::read(bad, kept::key(1, &wanted())).is_none());
+        assert!(kept::read(bad, kept::key(&drives(1), &wanted())).is_none());
     }
-    assert!(kept::read(&whole, kept::key(2, &wanted())).is_none(), "other drives");
+    assert!(kept::read(&whole, kept::key(&drives(2), &wanted())).is_none(), "other drives");
+    let full = Drives { rig: SensorRig::hdl32x4_full(), ..drives(1) };
+    assert!(kept::read(&whole, kept::key(&full, &wanted())).is_none(), "another rig");
 }
 
 /// Errors by kind of the baseline and of ours: m, m/s, rad, rad/s, nats above the truth.

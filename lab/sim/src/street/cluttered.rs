@@ -3,15 +3,10 @@
 //! with gaps, walls seen through slots, banks, posts behind parked cars, flat sides half hidden.
 
 use super::Yard;
-use crate::dimensions::{EDGE, ROAD_HALF};
 use crate::object::{Class, Surface};
 use crate::shape::Shape;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
-
-/// Walkers keep to the inner part of the sidewalk: beyond this distance from the road's middle
-/// nothing is in anyone's way, m.
-const FREE_M: f64 = EDGE - 0.4;
 
 impl Yard<'_> {
     /// Clutters both sides of the main road.
@@ -22,24 +17,35 @@ impl Yard<'_> {
         }
     }
 
+    /// Walkers keep to the inner part of the sidewalk: beyond this distance from the road's middle
+    /// nothing is in anyone's way, m.
+    fn free(&self) -> f64 {
+        self.edge() - 0.4
+    }
+
     /// One kind of border after another, with gaps in between.
     fn edge_of_sidewalk(&mut self, x: [f64; 2], side: f64) {
         let mut from = x[0] + self.rng.range(0.0, 6.0);
         while from < x[1] {
             let to = from + self.rng.range(5.0, 18.0);
-            let y = side * (FREE_M + self.rng.range(0.1, 0.5));
+            let y = side * (self.free() + self.rng.range(0.1, 0.5));
             if !self.in_crossing(0.5 * (from + to), 0.5 * (to - from) + 0.5) {
-                match self.count(0, 9) {
-                    0 | 1 => self.pickets([from, to], y),
-                    2 | 3 => self.mesh([from, to], y),
-                    4 => self.loose_bushes([from, to], y),
-                    5 => self.slotted_wall([from, to], y),
-                    6 => self.pillars([from, to], y),
-                    7 => self.bank([from, to], side),
-                    _ => self.half_hidden([from, to], y),
-                }
+                self.gappy_border([from, to], y);
             }
             from = to + self.rng.range(0.5, 8.0);
+        }
+    }
+
+    /// A border that has gaps, edges that are none, or a slope.
+    pub(super) fn gappy_border(&mut self, stretch: [f64; 2], y: f64) {
+        match self.count(0, 9) {
+            0 | 1 => self.pickets(stretch, y),
+            2 | 3 => self.mesh(stretch, y),
+            4 => self.loose_bushes(stretch, y),
+            5 => self.slotted_wall(stretch, y),
+            6 => self.pillars(stretch, y),
+            7 => self.bank(stretch, y.signum()),
+            _ => self.half_hidden(stretch, y),
         }
     }
 
@@ -143,10 +149,10 @@ impl Yard<'_> {
     /// A bank rising from the sidewalk's edge: a tilted slab of earth.
     fn bank(&mut self, [from, to]: [f64; 2], side: f64) {
         let (slope, out) = (self.rng.range(0.15, 0.7), self.rng.range(2.0, 5.0));
-        let (x, y) = (0.5 * (from + to), side * (FREE_M + 0.5 * out));
+        let (x, y) = (0.5 * (from + to), side * (self.free() + 0.5 * out));
         let thick = 1.0;
         let middle = 0.5 * out * slope.tan() - 0.5 * thick / slope.cos();
-        let z = self.ground.height(x, side * FREE_M) + middle;
+        let z = self.ground.height(x, side * self.free()) + middle;
         let turn = DQuat::from_rotation_x(side * slope);
         let shape = Shape::cuboid(to - from, out / slope.cos(), thick);
         let pose = Pose::new(turn, DVec3::new(x, y, z));
@@ -182,7 +188,7 @@ impl Yard<'_> {
             for _ in 0..self.count(3, 12) {
                 if !self.in_crossing(at, 0.5) {
                     let radius = self.rng.range(0.03, 0.09);
-                    self.pole(at, side * (ROAD_HALF + 0.5), radius, height);
+                    self.pole(at, side * (self.kerb() + 0.5), radius, height);
                 }
                 at += step;
             }

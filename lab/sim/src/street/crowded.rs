@@ -5,7 +5,6 @@
 //! these alone ([`crate::traffic`]).
 
 use super::Yard;
-use crate::dimensions::{EDGE, ROAD_HALF};
 use crate::object::{Class, Surface};
 use crate::shape::Shape;
 use glam::{DQuat, DVec3};
@@ -15,8 +14,8 @@ impl Yard<'_> {
     /// Rows of such things on both sides of the main road.
     pub(super) fn crowd(&mut self, x: [f64; 2]) {
         for side in [-1.0, 1.0] {
-            self.row(x, side, [ROAD_HALF - 1.5, ROAD_HALF - 0.4]);
-            self.row(x, side, [EDGE - 1.3, EDGE - 0.4]);
+            self.row(x, side, [self.kerb() - 1.5, self.kerb() - 0.4]);
+            self.row(x, side, [self.edge() - 1.3, self.edge() - 0.4]);
         }
     }
 
@@ -56,7 +55,7 @@ impl Yard<'_> {
             let around = f64::from(n) * 1.6 + self.rng.range(-0.4, 0.4);
             self.chair([x, y], wide + 0.3, around);
         }
-        if y.abs() > ROAD_HALF && self.rng.chance(0.5) {
+        if y.abs() > self.kerb() && self.rng.chance(0.5) {
             self.parasol(x, y);
         }
     }

@@ -2,7 +2,7 @@
 //! borders of plots.
 
 use super::Yard;
-use crate::dimensions::{CROSS_HALF, EDGE, ROAD_HALF};
+use crate::dimensions::CROSS_HALF;
 use crate::object::{Class, Surface};
 use crate::shape::Shape;
 use glam::{DQuat, DVec3};
@@ -14,7 +14,7 @@ impl Yard<'_> {
     pub(super) fn kerb_side(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0] + self.rng.range(0.0, 8.0);
         while at < x[1] {
-            let y = side * (ROAD_HALF + self.rng.range(0.45, 0.8));
+            let y = side * (self.kerb() + self.rng.range(0.45, 0.8));
             if !self.in_crossing(at, 1.0) {
                 match self.count(0, 20) {
                     0..6 => self.street_tree(at, y),
@@ -37,7 +37,7 @@ impl Yard<'_> {
         let mut at = x[0] + self.rng.range(0.0, 10.0);
         while at < x[1] {
             let length = self.rng.range(1.5, 9.0);
-            let y = side * (EDGE - self.rng.range(0.2, 0.5));
+            let y = side * (self.edge() - self.rng.range(0.2, 0.5));
             if !self.in_crossing(at, 0.5 * length + 0.5) {
                 match self.count(0, 10) {
                     0..4 => self.border(at, y, length),
@@ -160,7 +160,7 @@ impl Yard<'_> {
 
     /// A shelter at a stop: posts, a roof, panes at the back.
     fn shelter(&mut self, x: f64, side: f64) {
-        let (length, y) = (self.rng.range(3.0, 5.0), side * (EDGE + 0.2));
+        let (length, y) = (self.rng.range(3.0, 5.0), side * (self.edge() + 0.2));
         let pane = Surface::glass(0.4);
         self.raised(Class::Fixture, [x, y, 2.3], [length, 1.4, 0.12], 0.0, Surface::matt(0.4));
         let back = y + side * 0.6;
@@ -174,7 +174,7 @@ impl Yard<'_> {
     pub(super) fn signals(&mut self) {
         for (along, side) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
             let x = self.crossing + along * (CROSS_HALF + 0.7);
-            let y = side * (ROAD_HALF + 0.7);
+            let y = side * (self.kerb() + 0.7);
             let height = self.rng.range(2.6, 3.8);
             self.pole(x, y, 0.07, height);
             let at = [x, y, height - 0.9];

@@ -2,7 +2,6 @@
 //! through.
 
 use super::Yard;
-use crate::dimensions::EDGE;
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {
@@ -114,7 +113,7 @@ impl Yard<'_> {
         let amount = ((x[1] - x[0]) * 0.9) as u32;
         for _ in 0..amount {
             let (at, back) = (self.rng.range(x[0], x[1]), self.rng.unit());
-            let y = side * (EDGE + 1.2 + 32.0 * back * back);
+            let y = side * (self.edge() + 1.2 + 32.0 * back * back);
             if self.in_crossing(at, 2.0) {
                 continue;
             }

@@ -1,7 +1,7 @@
 //! Houses: in closed rows, behind gardens, along the crossing road.
 
 use super::Yard;
-use crate::dimensions::{CROSS_HALF, EDGE};
+use crate::dimensions::CROSS_HALF;
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {
@@ -17,7 +17,7 @@ impl Yard<'_> {
                 at += 2.0 - length;
                 continue;
             }
-            let front = EDGE + self.rng.range(0.0, 3.0);
+            let front = self.edge() + self.rng.range(0.0, 3.0);
             if self.rng.chance(0.2) {
                 at += self.rng.range(3.0, 8.0);
                 self.gap(middle, side * (front + 4.0));
@@ -58,15 +58,15 @@ impl Yard<'_> {
                 at += 3.0 - plot;
                 continue;
             }
-            let front = EDGE + self.rng.range(3.5, 9.0);
+            let front = self.edge() + self.rng.range(3.5, 9.0);
             let length = plot - self.rng.range(3.0, 6.0);
             let size = [length, self.rng.range(8.0, 12.0), self.rng.range(3.5, 9.0)];
             self.house(middle, side, front, size);
             let closed = plot - self.rng.range(0.5, 4.0);
-            self.border(middle, side * (EDGE + 0.3), closed);
+            self.border(middle, side * (self.edge() + 0.3), closed);
             for _ in 0..self.count(3, 11) {
                 let x = middle + self.rng.range(-0.5, 0.5) * plot;
-                let y = side * self.rng.range(EDGE + 1.0, front - 0.5);
+                let y = side * self.rng.range(self.edge() + 1.0, front - 0.5);
                 match self.count(0, 9) {
                     0 | 1 => self.tree(x, y),
                     2..5 => self.bed(x, y),

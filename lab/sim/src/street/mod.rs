@@ -6,6 +6,7 @@ mod fronts;
 mod furniture;
 mod green;
 mod houses;
+mod narrow;
 
 use crate::dimensions::CROSS_HALF;
 use crate::ground::Ground;
@@ -40,16 +41,31 @@ impl Extent {
     }
 }
 
+/// What stands along a street.
+pub(crate) struct Background {
+    pub(crate) fixtures: Vec<Fixture>,
+    /// Where cars may be parked beside houses.
+    pub(crate) driveways: Vec<Path>,
+}
+
 /// Builds the background on this ground; `crossing` is x of the crossing road's centre line, m.
-pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Vec<Fixture> {
-    let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
+pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Background {
+    let mut yard = Yard::new(ground, crossing, rng);
+    let narrow = !ground.section().has_parking();
     for side in [-1.0, 1.0] {
-        yard.blocks(extent.x, side);
-        yard.houses_along_crossing(extent.y, side);
-        yard.kerb_side(extent.x, side);
+        if narrow {
+            yard.plots(extent.x, side);
+            yard.houses_along_crossing(extent.y, side);
+        } else {
+            yard.blocks(extent.x, side);
+            yard.houses_along_crossing(extent.y, side);
+            yard.kerb_side(extent.x, side);
+        }
     }
-    yard.signals();
-    yard.fixtures
+    if !narrow {
+        yard.signals();
+    }
+    Background { fixtures: yard.fixtures, driveways: yard.driveways }
 }
 
 /// What a street has in addition to the plain one.
@@ -69,7 +85,7 @@ pub(crate) fn add(
     extra: Extra,
     rng: &mut Rng,
 ) -> Vec<Fixture> {
-    let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
+    let mut yard = Yard::new(ground, crossing, rng);
     match extra {
         Extra::Cluttered => yard.clutter(extent.x),
         Extra::Crowded => yard.crowd(extent.x),
@@ -80,11 +96,26 @@ pub(crate) fn add(
 struct Yard<'a> {
     ground: &'a Ground,
     fixtures: Vec<Fixture>,
+    driveways: Vec<Path>,
     crossing: f64,
     rng: &'a mut Rng,
 }
 
-impl Yard<'_> {
+impl<'a> Yard<'a> {
+    fn new(ground: &'a Ground, crossing: f64, rng: &'a mut Rng) -> Yard<'a> {
+        Yard { ground, fixtures: Vec::new(), driveways: Vec::new(), crossing, rng }
+    }
+
+    /// Distance of the kerb from the road's centre line, m.
+    fn kerb(&self) -> f64 {
+        self.ground.section().road_half
+    }
+
+    /// Distance of a sidewalk's far edge from the road's centre line, m.
+    fn edge(&self) -> f64 {
+        self.ground.section().edge()
+    }
+
     /// Everything beyond the sidewalk, in blocks of one kind each.
     fn blocks(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0];

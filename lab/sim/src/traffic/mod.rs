@@ -4,13 +4,13 @@
 mod footprint;
 mod routes;
 
-use crate::dimensions::{CROSS_HALF, ROAD_HALF};
+use crate::dimensions::CROSS_HALF;
 use crate::ego::{LANE, Pace, Plan};
 use crate::models;
-use crate::object::{Fixture, Object};
+use crate::object::Object;
 use crate::path::Path;
 use crate::rng::Rng;
-use crate::street::Extent;
+use crate::street::{Background, Extent};
 use footprint::{Footprint, obstacle};
 use routes::{GROUP_M, Routes};
 use std::f64::consts::PI;
@@ -30,9 +30,9 @@ const DRIVERS: [(f64, Model, bool); 6] = [
     (0.05, models::tram, false),
 ];
 
-/// Traffic among these fixtures, by ascending id from 1; `density` 1 is a busy street.
+/// Traffic on this street, by ascending id from 1; `density` 1 is a busy street.
 pub(crate) fn fill(
-    fixtures: &[Fixture],
+    street: &Background,
     extent: Extent,
     plan: &Plan,
     duration_s: f64,
@@ -40,9 +40,14 @@ pub(crate) fn fill(
     rng: &mut Rng,
 ) -> Vec<Object> {
     let mut taken = vec![Footprint::new(&plan.path, 4.6, 1.9, duration_s)];
-    taken.extend(fixtures.iter().filter_map(obstacle));
+    taken.extend(street.fixtures.iter().filter_map(obstacle));
     let mut fill = Fill { objects: Vec::new(), plan, duration_s, taken, rng };
     fill.park(extent.x, density);
+    for place in &street.driveways {
+        if fill.rng.chance(0.6 * density) {
+            fill.try_add(models::car, place.clone());
+        }
+    }
     let amount =
         |fixed: f64, per_second: f64| (density * (fixed + per_second * duration_s)).round() as u32;
     // Those that need the most room first.
@@ -151,20 +156,23 @@ impl Fill<'_> {
         }
     }
 
-    /// Parked vehicles on both parking strips, away from the crossing.
+    /// Parked vehicles on both parking strips, away from the crossing; where there are none, a few
+    /// stand half on the sidewalk.
     fn park(&mut self, x: [f64; 2], density: f64) {
+        let section = self.plan.section;
+        let (share, aside) = if section.has_parking() { (0.5, 1.1) } else { (0.1, 0.5) };
         for side in [-1.0, 1.0] {
             let mut at = x[0];
             while at < x[1] {
                 at += self.rng.range(5.4, 7.5);
-                if !self.rng.chance(0.5 * density)
+                if !self.rng.chance(share * density)
                     || (at - self.plan.crossing).abs() < CROSS_HALF + 8.0
                 {
                     continue;
                 }
                 let against = if self.rng.chance(0.15) { PI } else { 0.0 };
                 let yaw = if side < 0.0 { 0.0 } else { PI } + against + 0.03 * self.rng.bell();
-                let y = side * (ROAD_HALF - 1.1 + self.rng.range(-0.08, 0.08));
+                let y = side * (section.road_half - aside + self.rng.range(-0.08, 0.08));
                 let model: Model = match (self.rng.unit() * 20.0) as u32 {
                     0..16 => models::car,
                     16..19 => models::van,

@@ -1,6 +1,6 @@
 //! Paths of traffic: along, across, turning, braking, overtaking.
 
-use crate::dimensions::{EDGE, ROAD_HALF};
+use crate::dimensions::Section;
 use crate::ego::{LANE, Pace, Plan};
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
@@ -76,7 +76,12 @@ impl Routes<'_> {
     }
 
     pub(super) fn rider(&mut self) -> Path {
-        if self.rng.chance(0.75) { self.along(3.1, 3.0, 6.0) } else { self.crossing(3.2, 3.0, 6.0) }
+        let beside = f64::min(3.1, self.plan.section.road_half - 0.5);
+        if self.rng.chance(0.75) {
+            self.along(beside, 3.0, 6.0)
+        } else {
+            self.crossing(3.2, 3.0, 6.0)
+        }
     }
 
     /// Straight along the main road, `beside` its centre line.
@@ -114,7 +119,9 @@ impl Routes<'_> {
         let (gap, change_s) = (self.rng.range(9.0, 14.0), self.rng.range(2.2, 3.5));
         let before = gap / (speed - other.speed) + change_s;
         let start = State { x: other.x - sign * speed * before, ..lane(sign, LANE, speed) };
-        let path = Path::starting(abreast - before, start).then_shift(aside, change_s);
+        // Straight until then: the first leg extends back indefinitely.
+        let path = Path::starting(abreast - before, start).then(0.0, 0.0, 0.0);
+        let path = path.then_shift(aside, change_s);
         path.then(2.0 * gap / (speed - other.speed), 0.0, 0.0).then_shift(-aside, change_s)
     }
 
@@ -146,9 +153,9 @@ impl Routes<'_> {
 
     /// Anywhere between the houses, standing there or walking in any direction.
     pub(super) fn stroller(&mut self) -> Path {
-        const REACH: f64 = EDGE - 0.7 - GROUP_M;
+        let reach = self.plan.section.edge() - 0.7 - GROUP_M;
         let (t, x) = self.meeting();
-        let [from, to] = [0; 2].map(|_| self.rng.range(-REACH, REACH));
+        let [from, to] = [0; 2].map(|_| self.rng.range(-reach, reach));
         let speed = self.rng.range(0.4, 1.8);
         if self.rng.chance(0.35) {
             return Path::stationary(x, from, self.rng.range(-PI, PI));
@@ -169,7 +176,9 @@ impl Routes<'_> {
             _ => ([0.8, 2.0], [1.4, 3.2]),
         };
         let speed = self.rng.range(slow, fast);
-        let y = side * (ROAD_HALF + self.rng.range(aside[0], aside[1]));
+        let section = self.plan.section;
+        let part = section.sidewalk / Section::WIDE.sidewalk;
+        let y = side * (section.road_half + part * self.rng.range(aside[0], aside[1]));
         let yaw = if sign > 0.0 { 0.0 } else { PI };
         match (self.rng.unit() * 10.0) as u32 {
             0 => Path::stationary(x, y, self.rng.range(-PI, PI)),

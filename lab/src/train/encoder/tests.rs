@@ -3,19 +3,23 @@
 use super::network::Input;
 use super::samples::Sample;
 use super::*;
+use crate::grid::Grid;
 use crate::scratch::Scratch;
-use crate::train::drives::LabelledSweep;
+use crate::train::drives::{Labelled, LabelledSweep};
 use crate::train::simulated::Simulated;
+use raywake_core::encoder::{SHIPPED, could_move as nats};
 use raywake_core::params::Profile;
-use raywake_sim::{Drive, Options, SensorRig};
+use raywake_core::stages::background_filter::{self, TABLE_WORDS, score};
+use raywake_sim::{Drive, Options, Path, SensorRig, State};
+use std::collections::BTreeMap;
 
 /// A window of a simulated street.
 fn street() -> Sample {
     let options = Options { sweeps: 1, rig: SensorRig::vlp32x2(), ..Options::default() };
     let mut drive = Simulated::new(Drive::new(5, options));
-    let mut grid = crate::grid::Grid::new(Profile::hdl64());
+    let mut grid = Grid::new(Profile::hdl64());
     let mut sweep = LabelledSweep::default();
-    crate::train::drives::Labelled::read(&mut drive, 0, &mut sweep).unwrap();
+    drive.read(0, &mut sweep).unwrap();
     samples::sample(&mut grid, &drive, &sweep)
 }
 
@@ -119,4 +123,49 @@ fn training_overfits_one_window_and_can_be_interrupted() {
     std::fs::write(&file, &bytes[..100]).unwrap();
     let short = error(fit(&samples, steps, 1, Some(&file)));
     assert!(short.contains("another length"), "{short}");
+}
+
+/// Of the columns that are solid in both of two successive sweeps of a street in which nothing
+/// moves, how many are foreground in one of them alone: by the filter, and by the encoder, which
+/// thinks rather than not that they could move.
+fn flipped(rig: &SensorRig, path: Path) -> [usize; 2] {
+    let options = Options { sweeps: 2, rig: rig.clone(), ..Options::default() };
+    let mut scene = Drive::new(11, options.clone()).scene().clone();
+    scene.objects.retain(|o| o.path.is_static());
+    let mut drive = Simulated::new(Drive::through(scene, path, 11, options));
+    let profile = Profile::hdl64();
+    let mut table = vec![0; TABLE_WORDS];
+    background_filter::load(background_filter::SHIPPED, LEVELS, &mut table).unwrap();
+    let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
+    encoder.load_weights(|weights| weights.load(SHIPPED, LEVELS)).unwrap();
+    let mut grid = Grid::new(profile);
+    let mut sweep = LabelledSweep::default();
+    let mut foreground = [BTreeMap::new(), BTreeMap::new()];
+    for (index, into) in foreground.iter_mut().enumerate() {
+        drive.read(index, &mut sweep).unwrap();
+        let window = grid.sweep(drive.rig(), &sweep.data.sweep());
+        let (side, corner) = (grid.step.side as usize, [window.corner[0], window.corner[1]]);
+        encoder.keep(&grid.columns, side, corner);
+        encoder.encode(&SingleThread);
+        for column in (0..side * side).filter(|c| grid.columns[*c][1] != 0) {
+            let at = [corner[0] + (column / side) as i32, corner[1] + (column % side) as i32];
+            let by_filter = score(&grid.step, &table, &grid.columns, column) > 0;
+            into.insert(at, [by_filter, nats(&encoder.scores()[column]) >= 0.0]);
+        }
+    }
+    let [first, second] = &foreground;
+    let both: Vec<_> = first.iter().filter_map(|(at, a)| Some((a, second.get(at)?))).collect();
+    assert!(both.len() > 2000, "{}", both.len());
+    [0, 1].map(|n| both.iter().filter(|(a, b)| a[n] != b[n]).count())
+}
+
+#[test]
+fn where_nothing_moves_less_flips_than_with_the_filter() {
+    for rig in [SensorRig::hdl64(), SensorRig::vlp32x2()] {
+        for speed in [0.0, 8.0] {
+            let path = Path::from(State { y: -1.75, speed, ..State::default() });
+            let [filter, encoder] = flipped(&rig, path);
+            assert!(0 < encoder && 2 * encoder < filter, "{encoder} of {filter}");
+        }
+    }
 }
