@@ -2,9 +2,9 @@
 
 use super::cluster::{Cluster, ColumnSet};
 use super::clusters::{Clusters, is_moving, is_static};
-use super::cues::{Looks, Prediction};
-use super::history::History;
+use super::cues::Prediction;
 use super::hypothesis::{self, evidence};
+use super::motion::Motion;
 use super::scans::Scans;
 use crate::record::NONE;
 
@@ -13,7 +13,8 @@ const NEIGHBOURS_MAX: usize = 8;
 
 impl Clusters {
     /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
-    /// go with these if they fit.
+    /// go with these if they fit. Without evidence of their own they must not have been there
+    /// before ([`Scans::was_hit`]).
     pub(super) fn absorb_fragments(&mut self, scans: Scans) {
         let visited = &mut ColumnSet::new();
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
@@ -34,7 +35,8 @@ impl Clusters {
     }
 
     /// Lets whatever could move and touches a moving cluster go with it if its motion fits about as
-    /// well as rest: the sides of a bus slide along themselves; only its ends show the motion.
+    /// well as rest: the sides of a bus slide along themselves; only its ends show the motion. So
+    /// does a wall beside someone who walks; but it was there before, and stays.
     pub(super) fn complete_bodies(
         &mut self,
         scans: Scans,
@@ -54,7 +56,10 @@ impl Clusters {
             let static_residual = rest.static_residual(None, visited).0;
             let with = near.iter().filter_map(|m| {
                 let body = &self.found[*m as usize];
-                hypothesis::along_with(&rest, static_residual, body, predicted, visited)
+                let with =
+                    hypothesis::along_with(&rest, static_residual, body, predicted, visited)?;
+                let passed = self.was_hit(&scans, columns, &with.motion);
+                (!passed).then_some(with)
             });
             let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
             // If there is no room for one more, it stays static.
@@ -89,7 +94,7 @@ impl Clusters {
     /// have come to where something was hit before. Someone who walks along a low wall touches it,
     /// and it slides along itself. A cluster without anything that could move is judged as a whole,
     /// by `worn_max`.
-    pub(super) fn leave_behind(&mut self, scans: Scans, history: &History) {
+    pub(super) fn leave_behind(&mut self, scans: Scans) {
         // Nothing is known then: this saves time.
         if scans.scores.is_empty() {
             return;
@@ -102,7 +107,7 @@ impl Clusters {
         let mut left = ColumnSet::new();
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
-            if self.is_passed(&scans, history, columns) {
+            if self.is_passed(&scans, columns) {
                 for c in columns {
                     left.insert(*c as usize);
                 }
@@ -116,19 +121,27 @@ impl Clusters {
     }
 
     /// Whether a moving cluster only passes a part of it that could not move.
-    fn is_passed(&self, scans: &Scans, history: &History, columns: &[u32]) -> bool {
-        let params = &scans.scaled.params;
-        let mut looks = Looks::default();
-        columns.iter().for_each(|c| looks += self.looks(scans, history, *c as usize));
-        if looks.worn() <= params.passed_worn_min {
+    fn is_passed(&self, scans: &Scans, columns: &[u32]) -> bool {
+        let id = self.of_column[columns[0] as usize];
+        let motion = &self.found[id as usize].motion;
+        if !self.was_hit(scans, columns, motion) {
             return false;
         }
-        let id = self.of_column[columns[0] as usize];
-        let part = Cluster::new(*scans, columns);
-        let [rest, moved] = part.own_residuals(&self.found[id as usize].motion);
+        let [rest, moved] = Cluster::new(*scans, columns).own_residuals(motion);
         let mut of_cluster = self.of_column.iter().enumerate().filter(|(_, of)| **of == id);
-        evidence(rest, moved) <= params.evidence_min
+        evidence(rest, moved) <= scans.scaled.params.evidence_min
             && of_cluster.any(|(c, _)| scans.could_move(c) > 0.0)
+    }
+
+    /// Whether columns, had they moved like this, would have come to where something else was hit
+    /// before ([`Scans::was_hit`]): neither they nor what moves alike, since a long vehicle may be
+    /// in several pieces.
+    fn was_hit(&self, scans: &Scans, columns: &[u32], motion: &Motion) -> bool {
+        let spacing = scans.scaled.start_spacing;
+        scans.was_hit(columns, motion, |c| {
+            let found = self.found.get(self.of_column[c] as usize);
+            found.is_some_and(|f| f.is_dynamic && f.motion.is_near(motion, spacing))
+        })
     }
 
     /// Lets the ground below a moving cluster, where nothing else stands, go with it, unless the
@@ -169,10 +182,11 @@ impl Clusters {
             let residual = fragment.residual(&found.motion, visited);
             let is_remainder = found.parent == parent && found.extent > extent_min;
             let hidden = visible < params.visible_ratio && residual < params.residual_bad;
+            let was_hit = || self.was_hit(&fragment.scans, fragment.columns, &found.motion);
             let joins = evidence(rest, residual)
                 > params.evidence_min * params.evidence_prior_ratio
-                || hidden
-                || is_remainder && residual < rest + params.remainder_residual;
+                || (hidden || is_remainder && residual < rest + params.remainder_residual)
+                    && !was_hit();
             if joins && residual < best.0 {
                 best = (residual, Some(*m));
             }

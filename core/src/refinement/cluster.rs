@@ -36,6 +36,14 @@ impl ColumnSet {
         self.0[column / 64] >> (column % 64) & 1 != 0
     }
 
+    /// Its columns, ascending.
+    pub fn iter(&self) -> impl Iterator<Item = usize> {
+        let some = self.0.iter().enumerate().filter(|(_, word)| **word != 0);
+        some.flat_map(|(n, word)| {
+            (0..64).filter(move |b| word >> b & 1 != 0).map(move |b| 64 * n + b)
+        })
+    }
+
     fn remove(&mut self, columns: &[u32]) {
         columns.iter().for_each(|c| self.0[*c as usize / 64] &= !(1 << (c % 64)));
     }

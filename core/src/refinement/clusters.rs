@@ -3,7 +3,6 @@
 
 use super::cluster::{Cluster, ColumnSet};
 use super::cues::{ColumnCues, Cues, Looks, Prediction};
-use super::history::History;
 use super::hypothesis::{self, Hypothesis};
 use super::motion::Motion;
 use super::scans::Scans;
@@ -75,7 +74,6 @@ impl Clusters {
         &mut self,
         team: &impl Team,
         scans: Scans,
-        history: &History,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
         predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
@@ -93,19 +91,19 @@ impl Clusters {
         });
         // Someone walking beside a wall moves by less than a column from sweep to sweep.
         self.find_moving_parts(team, scans, flow, predicted, params.part_since_margin, |c| {
-            !scans.stays(c) && history.is_new(scans.first, c, params.part_since_s)
+            !scans.stays(c) && scans.history.is_new(scans.first, c, params.part_since_s)
         });
-        self.find_earlier_hits(scans, history);
+        self.find_earlier_hits(scans);
         for found in &mut self.found {
             found.is_dynamic &= found.cues.worn <= params.worn_max;
         }
         self.absorb_fragments(scans);
         self.complete_bodies(scans, predicted);
-        self.leave_behind(scans, history);
+        self.leave_behind(scans);
         self.drop_immovable(scans);
         self.include_ground(scans);
-        self.find_earlier_hits(scans, history);
-        self.found.iter_mut().for_each(|f| f.cues.no_history = history.is_short());
+        self.find_earlier_hits(scans);
+        self.found.iter_mut().for_each(|f| f.cues.no_history = scans.history.is_short());
         let (of_column, found) = (&self.of_column, &self.found);
         let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);
@@ -177,9 +175,7 @@ impl Clusters {
                 let columns = self.segments.columns(n - whole);
                 let (id, parent) = (kept as u32, self.of_column[columns[0] as usize]);
                 columns.iter().for_each(|c| self.of_column[*c as usize] = id);
-                for &c in columns {
-                    grow(scans, c as usize, &found.motion, [parent, id], &mut self.of_column);
-                }
+                grow(scans, columns, &found.motion, [parent, id], &mut self.of_column);
                 self.found[kept] = Hypothesis { parent, ..found };
                 kept += 1;
             }
@@ -188,11 +184,11 @@ impl Clusters {
     }
 
     /// Finds what was hit before at the places that moving clusters came to.
-    fn find_earlier_hits(&mut self, scans: Scans, history: &History) {
+    fn find_earlier_hits(&mut self, scans: Scans) {
         self.found.iter_mut().for_each(|f| f.looks = Looks::default());
         for c in 0..scans.first.side * scans.first.side {
             if is_moving(&self.of_column, &self.found, c) {
-                let looks = self.looks(&scans, history, c);
+                let looks = self.looks(&scans, c);
                 self.found[self.of_column[c] as usize].looks += looks;
             }
         }
@@ -203,7 +199,7 @@ impl Clusters {
     }
 
     /// The looks at a column of a moving cluster.
-    pub(super) fn looks(&self, scans: &Scans, history: &History, column: usize) -> Looks {
+    fn looks(&self, scans: &Scans, column: usize) -> Looks {
         let (first, n) = (scans.first, self.of_column[column]);
         let at = [column / first.side, column % first.side].map(|c| c as f32 + 0.5);
         let by = self.found[n as usize].motion.of(at);
@@ -211,7 +207,7 @@ impl Clusters {
         let could_start = scans.could_rather_move(column);
         let acceleration = could_start.then(|| scans.scaled.acceleration(scans.span_s));
         let is_part = |c: usize| self.of_column[c] == n;
-        history.looks(first, column, by, scans.span_s, acceleration, is_part)
+        scans.history.looks(first, column, by, scans.span_s, acceleration, is_part)
     }
 }
 
@@ -225,28 +221,33 @@ pub fn is_moving(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool
     found.get(of_column[column] as usize).is_some_and(|f| f.is_dynamic)
 }
 
-/// Gives columns of the `parent` next to a column of its moving part to that part if their returns
-/// fit its motion about as well as rest.
+/// Gives columns of the `parent` next to those of its moving part to that part if their returns fit
+/// its motion about as well as rest, and they were not there before.
 fn grow(
     scans: Scans,
-    column: usize,
+    columns: &[u32],
     motion: &Motion,
     [parent, part]: [u32; 2],
     of_column: &mut [u32],
 ) {
     let (side, target) = (scans.first.side, &scans.targets[0]);
-    let (i, j) = (column / side, column % side);
-    for a in i.saturating_sub(1)..(i + 2).min(side) {
-        for b in j.saturating_sub(1)..(j + 2).min(side) {
-            let beside = a * side + b;
-            if of_column[beside] == parent {
-                let moved = scans
-                    .column_residual(beside, |s| Some(scans.dynamic_residual(s, motion, target)));
-                let rest = scans.column_residual(beside, |s| scans.static_residual(s));
-                if moved < rest + scans.scaled.params.growth_residual {
-                    of_column[beside] = part;
+    let fits = |c: usize| {
+        let moved = scans.column_residual(c, |s| Some(scans.dynamic_residual(s, motion, target)));
+        let rest = scans.column_residual(c, |s| scans.static_residual(s));
+        moved < rest + scans.scaled.params.growth_residual
+    };
+    // Given only in the end: looks leave out where the part alone was, in whatever order.
+    let mut given = ColumnSet::new();
+    for (i, j) in columns.iter().map(|c| (*c as usize / side, *c as usize % side)) {
+        for a in i.saturating_sub(1)..(i + 2).min(side) {
+            for b in j.saturating_sub(1)..(j + 2).min(side) {
+                let beside = a * side + b;
+                let was_hit = |c| scans.was_hit(&[c as u32], motion, |c| of_column[c] == part);
+                if of_column[beside] == parent && fits(beside) && !was_hit(beside) {
+                    given.insert(beside);
                 }
             }
         }
     }
+    given.iter().for_each(|c| of_column[c] = part);
 }

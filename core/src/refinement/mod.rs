@@ -144,8 +144,9 @@ impl Refinement {
         let targets = self.clouds.targets(span_s);
         let detail = self.clouds.second().detail;
         let traffic = &starts::traffic((0..side * side).filter_map(predicted));
-        let scans = Scans { scaled, first, targets: &targets, detail, scores, traffic, span_s };
-        self.clusters.find(team, scans, &self.history, flow, predicted);
+        let (targets, history) = (&targets, &self.history);
+        let scans = Scans { scaled, first, targets, detail, scores, traffic, span_s, history };
+        self.clusters.find(team, scans, flow, predicted);
         self.history.push(first, |c| self.clusters.came(c));
     }
 

@@ -2,6 +2,8 @@
 
 use super::cloud::{Cloud, DetailedCloud};
 use super::cloud_detail::CloudDetail;
+use super::cues::Looks;
+use super::history::History;
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
@@ -70,9 +72,25 @@ pub struct Scans<'a> {
     pub traffic: &'a [[f32; 2]],
     /// From the pair's first stamp to the second, s.
     pub span_s: f64,
+    /// Where something was hit before the pair.
+    pub history: &'a History,
 }
 
 impl<'a> Scans<'a> {
+    /// Whether columns of the first sweep, had they come with this motion, would have come to where
+    /// something was hit before, in more than `passed_worn_min` of the looks there. `with` tells
+    /// what else came with them. Nothing is excused as having been at rest there.
+    pub fn was_hit(&self, columns: &[u32], motion: &Motion, with: impl Fn(usize) -> bool) -> bool {
+        let side = self.first.side;
+        let is_part = |c: usize| with(c) || columns.binary_search(&(c as u32)).is_ok();
+        let mut looks = Looks::default();
+        for c in columns.iter().map(|c| *c as usize) {
+            let by = motion.of([c / side, c % side].map(|c| c as f32 + 0.5));
+            looks += self.history.looks(self.first, c, by, self.span_s, None, is_part);
+        }
+        looks.worn() > self.scaled.params.passed_worn_min
+    }
+
     /// The pair's second sweep.
     pub fn second(&self) -> DetailedCloud<'a> {
         DetailedCloud { cloud: self.targets[0].cloud, detail: self.detail }

@@ -90,17 +90,16 @@ impl Scenery {
         if let Some(place) = self.place(seed) {
             return outskirts::draw(place, seed, duration_s, density);
         }
-        let (ego, pace, extra) = match self {
-            Scenery::StreetFast => (ego.out_of_town(seed), Pace::Fast, None),
-            Scenery::StreetSlow => (ego, Pace::Slow, None),
-            Scenery::StreetCrowded => (ego, Pace::Crowd, Some(Extra::Crowded)),
-            Scenery::StreetCluttered => (ego, Pace::Town, Some(Extra::Cluttered)),
-            _ => (ego, Pace::Town, None),
-        };
-        let section = match self {
-            Scenery::StreetNarrow => Section::narrow(&mut Rng::split(seed, 11)),
-            _ => Section::WIDE,
-        };
+        let (mut pace, mut section, mut extra) = (Pace::Town, Section::WIDE, None);
+        match self {
+            Scenery::StreetFast => pace = Pace::Fast,
+            Scenery::StreetSlow => pace = Pace::Slow,
+            Scenery::StreetCrowded => (pace, extra) = (Pace::Crowd, Some(Extra::Crowded)),
+            Scenery::StreetCluttered => extra = Some(Extra::Cluttered),
+            Scenery::StreetNarrow => section = Section::narrow(&mut Rng::split(seed, 11)),
+            _ => {}
+        }
+        let ego = if pace == Pace::Fast { ego.out_of_town(seed) } else { ego };
         let plan = Plan { pace, section, ..ego.plan(seed, duration_s) };
         (Scene::around(seed, &plan, duration_s, density, extra), plan.path)
     }
@@ -119,7 +118,8 @@ impl FromStr for Scenery {
 mod tests {
     use super::*;
     use crate::collisions::check_clear;
-    use crate::object::{Class, Object};
+    use crate::object::{Class, Fixture, Object};
+    use crate::shape::Shape;
     use std::collections::BTreeSet;
 
     #[test]
@@ -157,13 +157,13 @@ mod tests {
             let (scene, path) = Scenery::StreetNarrow.draw(seed, Ego::Any, 6.0, 1.0);
             let section = scene.ground.section();
             assert!(section.edge() < wide.edge() - 2.0, "{section:?}");
-            let beside = |f: &&crate::object::Fixture| {
+            let beside = |f: &&Fixture| {
                 (section.edge()..section.edge() + 0.6).contains(&f.pose.translation.y.abs())
             };
             assert!(scene.fixtures.iter().filter(beside).count() > 10);
-            // Leaves may hang over a parked car.
-            let solid: Vec<_> =
-                scene.fixtures.iter().filter(|f| f.class != Class::Vegetation).cloned().collect();
+            // Crowns may hang over a parked car.
+            let crown = |f: &&Fixture| matches!(f.shape, Shape::Ellipsoid { .. });
+            let solid: Vec<_> = scene.fixtures.iter().filter(|f| !crown(f)).cloned().collect();
             let alone = Scene { objects: Vec::new(), ..scene.clone() };
             let ego = Some((&path, [4.6, 1.9, 2.0]));
             check_clear("the vehicle", &alone, &solid, ego);

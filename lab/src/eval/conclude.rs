@@ -111,7 +111,7 @@ fn of_boxes(report: &mut Report, drives: &[Facts], evidence: &Evidence, settings
         could_move_min: f64::from(settings.profile.refinement.could_move_min),
     };
     report
-        .section("Background filter")
+        .section("Rejection of the background")
         .table(tables::rejection(&curves))
         .chart(figures::precision_recall(&curves));
 }

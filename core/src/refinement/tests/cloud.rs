@@ -146,6 +146,7 @@ fn segments_are_what_a_flood_fill_reaches() {
             scores: &[],
             traffic: &[],
             span_s: 0.1,
+            history: &NO_HISTORY,
         };
         segments.find(&scans, part, |a, b| agree(&scans, flows[a], flows[b]));
         let touch = |a: usize, b: usize| {

@@ -33,6 +33,8 @@ const GROUND: f32 = 7.5 - 1.73 / 0.3;
 /// Position of the sensors: beside the window, 1.8 m above the ground.
 const EYE: [f32; 3] = [31.5, -20.0, GROUND + 6.0];
 
+/// Nothing was seen before the pair.
+static NO_HISTORY: History = History::new();
 const SENSORS: SensorPaths = SensorPaths::at_rest([EYE; 2]);
 
 fn profile() -> Profile {

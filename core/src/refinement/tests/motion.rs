@@ -266,7 +266,8 @@ fn potential_movers_may_go_where_nothing_is_seen() {
     let part = columns_with_returns(first);
     let (scaled, targets, could) = (&scaled, &targets, scored(127));
     let cluster = |scores| {
-        let scans = Scans { scaled, first, targets, detail, scores, traffic: &[], span_s: 0.1 };
+        let (traffic, history) = (&[], &NO_HISTORY);
+        let scans = Scans { scaled, first, targets, detail, scores, traffic, span_s: 0.1, history };
         Cluster::new(scans, &part)
     };
     let residual = |cluster: Cluster| {
@@ -292,8 +293,16 @@ fn objects_entering_the_window_were_outside() {
     let first = first.all();
     let part = columns_with_returns(first);
     let (scaled, detail) = (&scaled(), second.all().detail);
-    let scans =
-        Scans { scaled, first, targets: &targets, detail, scores: &[], traffic: &[], span_s: 0.1 };
+    let scans = Scans {
+        scaled,
+        first,
+        targets: &targets,
+        detail,
+        scores: &[],
+        traffic: &[],
+        span_s: 0.1,
+        history: &NO_HISTORY,
+    };
     let cluster = Cluster::new(scans, &part);
     let motion = Motion::around(cluster.centre).displaced([-8.0, 0.0]);
     let residual = cluster.residual(&motion, &mut ColumnSet::new());

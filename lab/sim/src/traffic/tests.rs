@@ -1,8 +1,10 @@
 //! Checks that all the manoeuvres that traffic should show occur.
 
-use crate::ego::Ego;
+use super::routes::Routes;
+use crate::ego::{Ego, LANE};
 use crate::object::Class;
-use crate::path::State;
+use crate::path::{Path, State};
+use crate::rng::Rng;
 use crate::scene::Scene;
 use std::collections::BTreeSet;
 
@@ -30,6 +32,20 @@ fn passes(a: &[State], b: &[State]) -> bool {
         let ((before, near), (after, still_near)) = (ahead(i - 1), ahead(i));
         before < 0.0 && after > 0.0 && near && still_near
     })
+}
+
+#[test]
+fn overtaking_cars_drive_straight_until_they_pull_out() {
+    let slow = Path::from(State { x: -60.0, y: -LANE, yaw: 0.0, speed: 3.0 });
+    let plan = Ego::Standing.plan(1, 30.0);
+    for seed in 0..20 {
+        let mut rng = Rng::new(seed);
+        // Abreast within the drive, it pulls out a few seconds before.
+        let path = Routes { plan: &plan, duration_s: 30.0, rng: &mut rng }.past(&slow);
+        let [before, early] = [-20.0, -10.0].map(|t| path.at(t));
+        assert!((before.y + LANE).abs() < 1e-9 && before.yaw == 0.0, "seed {seed}: {before:?}");
+        assert!(early.x > before.x && early.speed == before.speed, "seed {seed}: {early:?}");
+    }
 }
 
 #[test]
