@@ -14,7 +14,7 @@ const NEIGHBOURS_MAX: usize = 8;
 impl Clusters {
     /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
     /// go with these if they fit. Without evidence of their own they must not have been there
-    /// before ([`Scans::was_hit`]).
+    /// before (`worn_max`).
     pub(super) fn absorb_fragments(&mut self, scans: Scans) {
         let visited = &mut ColumnSet::new();
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
@@ -58,8 +58,8 @@ impl Clusters {
                 let body = &self.found[*m as usize];
                 let with =
                     hypothesis::along_with(&rest, static_residual, body, predicted, visited)?;
-                let passed = self.was_hit(&scans, columns, &with.motion);
-                (!passed).then_some(with)
+                let worn = self.worn(&scans, columns, &with.motion);
+                (worn <= scans.scaled.params.worn_max).then_some(with)
             });
             let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
             // If there is no room for one more, it stays static.
@@ -124,7 +124,7 @@ impl Clusters {
     fn is_passed(&self, scans: &Scans, columns: &[u32]) -> bool {
         let id = self.of_column[columns[0] as usize];
         let motion = &self.found[id as usize].motion;
-        if !self.was_hit(scans, columns, motion) {
+        if self.worn(scans, columns, motion) <= scans.scaled.params.passed_worn_min {
             return false;
         }
         let [rest, moved] = Cluster::new(*scans, columns).own_residuals(motion);
@@ -133,12 +133,12 @@ impl Clusters {
             && of_cluster.any(|(c, _)| scans.could_move(c) > 0.0)
     }
 
-    /// Whether columns, had they moved like this, would have come to where something else was hit
-    /// before ([`Scans::was_hit`]): neither they nor what moves alike, since a long vehicle may be
-    /// in several pieces.
-    fn was_hit(&self, scans: &Scans, columns: &[u32], motion: &Motion) -> bool {
+    /// Share of looks at columns that hit something else, had they moved like this
+    /// ([`Scans::worn`]): neither them nor what moves alike, since a long vehicle may be in several
+    /// pieces.
+    fn worn(&self, scans: &Scans, columns: &[u32], motion: &Motion) -> f32 {
         let spacing = scans.scaled.start_spacing;
-        scans.was_hit(columns, motion, |c| {
+        scans.worn(columns, motion, |c| {
             let found = self.found.get(self.of_column[c] as usize);
             found.is_some_and(|f| f.is_dynamic && f.motion.is_near(motion, spacing))
         })
@@ -182,11 +182,11 @@ impl Clusters {
             let residual = fragment.residual(&found.motion, visited);
             let is_remainder = found.parent == parent && found.extent > extent_min;
             let hidden = visible < params.visible_ratio && residual < params.residual_bad;
-            let was_hit = || self.was_hit(&fragment.scans, fragment.columns, &found.motion);
+            let worn = || self.worn(&fragment.scans, fragment.columns, &found.motion);
             let joins = evidence(rest, residual)
                 > params.evidence_min * params.evidence_prior_ratio
                 || (hidden || is_remainder && residual < rest + params.remainder_residual)
-                    && !was_hit();
+                    && worn() <= params.worn_max;
             if joins && residual < best.0 {
                 best = (residual, Some(*m));
             }

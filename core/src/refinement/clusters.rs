@@ -231,6 +231,7 @@ fn grow(
     of_column: &mut [u32],
 ) {
     let (side, target) = (scans.first.side, &scans.targets[0]);
+    let worn_max = scans.scaled.params.worn_max;
     let fits = |c: usize| {
         let moved = scans.column_residual(c, |s| Some(scans.dynamic_residual(s, motion, target)));
         let rest = scans.column_residual(c, |s| scans.static_residual(s));
@@ -242,8 +243,8 @@ fn grow(
         for a in i.saturating_sub(1)..(i + 2).min(side) {
             for b in j.saturating_sub(1)..(j + 2).min(side) {
                 let beside = a * side + b;
-                let was_hit = |c| scans.was_hit(&[c as u32], motion, |c| of_column[c] == part);
-                if of_column[beside] == parent && fits(beside) && !was_hit(beside) {
+                let worn = |c| scans.worn(&[c as u32], motion, |c| of_column[c] == part);
+                if of_column[beside] == parent && fits(beside) && worn(beside) <= worn_max {
                     given.insert(beside);
                 }
             }

@@ -77,10 +77,10 @@ pub struct Scans<'a> {
 }
 
 impl<'a> Scans<'a> {
-    /// Whether columns of the first sweep, had they come with this motion, would have come to where
-    /// something was hit before, in more than `passed_worn_min` of the looks there. `with` tells
-    /// what else came with them. Nothing is excused as having been at rest there.
-    pub fn was_hit(&self, columns: &[u32], motion: &Motion, with: impl Fn(usize) -> bool) -> bool {
+    /// Share of looks that hit something else ([`Looks::worn`]) of those at columns of the first
+    /// sweep, had they come with this motion. `with` tells what else came with them. Nothing is
+    /// excused as having been at rest there.
+    pub fn worn(&self, columns: &[u32], motion: &Motion, with: impl Fn(usize) -> bool) -> f32 {
         let side = self.first.side;
         let is_part = |c: usize| with(c) || columns.binary_search(&(c as u32)).is_ok();
         let mut looks = Looks::default();
@@ -88,7 +88,7 @@ impl<'a> Scans<'a> {
             let by = motion.of([c / side, c % side].map(|c| c as f32 + 0.5));
             looks += self.history.looks(self.first, c, by, self.span_s, None, is_part);
         }
-        looks.worn() > self.scaled.params.passed_worn_min
+        looks.worn()
     }
 
     /// The pair's second sweep.

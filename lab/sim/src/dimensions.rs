@@ -27,6 +27,11 @@ impl Section {
         self.road_half >= Section::WIDE.road_half
     }
 
+    /// Distance from the road's centre line of what is this far from the kerb on a wide sidewalk.
+    pub(crate) fn on_sidewalk(self, aside: f64) -> f64 {
+        self.road_half + self.sidewalk / Section::WIDE.sidewalk * aside
+    }
+
     /// Distance of a sidewalk's far edge from the road's centre line.
     pub(crate) fn edge(self) -> f64 {
         self.road_half + self.sidewalk

@@ -24,7 +24,7 @@ pub enum Scenery {
     StreetSlow,
     /// A slow one with crowds of people, standing and strolling among furniture, for tuning.
     StreetCrowded,
-    /// A narrow one, with borders of all kinds right beside the sidewalks, for training and tuning.
+    /// A narrow one, with borders of all kinds right beside the sidewalks, for tuning.
     StreetNarrow,
     /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,

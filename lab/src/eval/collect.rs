@@ -10,7 +10,7 @@ use crate::simulate::truth::PointTruth;
 use glam::DVec3;
 use raywake::backend::Tables;
 use raywake::engine::Pair;
-use raywake_core::encoder::{Encoder, could_move};
+use raywake_core::encoder::{Encoder, EncoderWeights, could_move};
 use raywake_core::frame::{Window, place};
 use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
@@ -105,14 +105,11 @@ impl<'a> Collector<'a> {
         let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
         let (before, reported_static) =
             (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
-        let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
-        encoder.set_weights(tables.encoder.as_deref());
-        let filter = tables.filter;
         Collector {
             profile,
             rig,
-            filter,
-            encoder,
+            encoder: encoder(tables.encoder.as_deref()),
+            filter: tables.filter,
             view,
             margin_m,
             objects,
@@ -287,12 +284,18 @@ fn motion(motion: Motion) -> u8 {
     }
 }
 
+fn encoder(weights: Option<&EncoderWeights>) -> Box<Encoder> {
+    let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
+    encoder.set_weights(weights);
+    encoder
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::eval::row::CLASSES;
     use crate::labels::{Kind, Labels, Track};
-    use raywake_core::encoder;
+    use raywake_core::encoder::SHIPPED;
     use raywake_core::output::FlowBasis;
     use raywake_core::stages::occupancy_constancy;
     use raywake_core::sweep::Point;
@@ -339,7 +342,7 @@ mod tests {
             &profile,
             None,
             occupancy_constancy::shipped(profile.frame),
-            Some(encoder::SHIPPED),
+            Some(SHIPPED),
         )
         .unwrap();
         let rig = source.rig().clone();

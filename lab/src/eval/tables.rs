@@ -91,6 +91,17 @@ pub struct Rejection {
     pub could_move_min: f64,
 }
 
+fn printed_rejection() -> TableRow {
+    let [recall, rejected] = [95.0, 74.5].map(|n| Cell::Number(n, 1));
+    TableRow::reference([
+        "dissertation".into(),
+        "at 95 % recall".into(),
+        recall,
+        rejected,
+        Cell::Empty,
+    ])
+}
+
 /// The background filter and the encoder, each at its own threshold and at the dissertation's
 /// recall.
 pub fn rejection(curves: &Rejection) -> Table {
@@ -106,12 +117,9 @@ pub fn rejection(curves: &Rejection) -> Table {
         });
         points.into_iter().flatten()
     };
-    let printed = [95.0, 74.5].map(|n| Cell::Number(n, 1));
-    let printed = ["dissertation".into(), "at 95 % recall".into()].into_iter().chain(printed);
     let filter = rows("background filter", &curves.filter, "threshold of the weights", 0.0);
     let encoder = rows("encoder", &curves.encoder, "`could_move_min`", curves.could_move_min);
-    let printed = TableRow::reference(printed.chain([Cell::Empty]));
-    let rows = filter.chain(encoder).chain([printed]).collect();
+    let rows = filter.chain(encoder).chain([printed_rejection()]).collect();
     let columns = ["By", "Threshold", "Recall, %", "Background accuracy, %", "Precision, %"];
     let caption = "Rejection of the background over solid columns in view. Foreground is whatever \
         lies in a labelled box, moving or not; background accuracy is the share of the other \

@@ -48,6 +48,11 @@ impl Yard<'_> {
             6..9 => self.garden_wall(middle, y, long),
             _ => {}
         }
+        self.garden([from, to], side, front);
+    }
+
+    /// Whatever grows between a sidewalk and a house.
+    fn garden(&mut self, [from, to]: [f64; 2], side: f64, front: f64) {
         for _ in 0..self.count(0, 8) {
             let x = self.rng.range(from, to);
             let y = side * self.rng.range(self.edge() + 1.2, front);

@@ -1,6 +1,5 @@
 //! Paths of traffic: along, across, turning, braking, overtaking.
 
-use crate::dimensions::Section;
 use crate::ego::{LANE, Pace, Plan};
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
@@ -176,9 +175,7 @@ impl Routes<'_> {
             _ => ([0.8, 2.0], [1.4, 3.2]),
         };
         let speed = self.rng.range(slow, fast);
-        let section = self.plan.section;
-        let part = section.sidewalk / Section::WIDE.sidewalk;
-        let y = side * (section.road_half + part * self.rng.range(aside[0], aside[1]));
+        let y = side * self.plan.section.on_sidewalk(self.rng.range(aside[0], aside[1]));
         let yaw = if sign > 0.0 { 0.0 } else { PI };
         match (self.rng.unit() * 10.0) as u32 {
             0 => Path::stationary(x, y, self.rng.range(-PI, PI)),

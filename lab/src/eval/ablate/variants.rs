@@ -79,16 +79,16 @@ pub const VARIANTS: [Variant; 30] = [
         p.refinement.could_move_min = -8.0;
         p
     }),
+    of("encoder-no-passing", "nothing that is only passed is left behind", |mut p| {
+        p.refinement.passed_worn_min = 1.0;
+        p
+    }),
     of("encoder-no-body", "the encoder completes no body", |mut p| {
         p.refinement.body_min = 8.0;
         p
     }),
     of("encoder-no-cue", "P(moves) without the class", |mut p| {
         p.moves.moves_could_move = 0.0;
-        p
-    }),
-    of("passing-off", "earlier hits keep nothing from going with what moves", |mut p| {
-        p.refinement.passed_worn_min = 1.0;
         p
     }),
     Variant {
@@ -164,9 +164,9 @@ mod tests {
             "filter-off",
             "encoder-off",
             "encoder-no-veto",
+            "encoder-no-passing",
             "encoder-no-body",
             "encoder-no-cue",
-            "passing-off",
             "author-constancy",
             "sensor-frame",
             "dissertation",

@@ -54,11 +54,12 @@ fn static_structure_is_reported_static() {
     for (class, most) in [
         ("all static", 0.0025),
         ("building", 0.002),
-        ("vegetation", 0.008),
+        // Eight of 14 as if they had just started: `acceleration_mps2`.
+        ("vegetation", 0.01),
         ("fence", 0.005),
         ("sidewalk", 0.005),
-        // Three returns of 8,643.
-        ("terrain", 0.04),
+        // One return of 8,643.
+        ("terrain", 0.012),
     ] {
         println!("{class}: {}", share(class));
         assert!(share(class) <= most, "{} % of {class}", share(class));
