@@ -44,7 +44,8 @@ impl Yard<'_> {
         match self.count(0, 10) {
             // Some of these are longer than they are told.
             0..4 => self.gappy_border([from + 3.0, to - 3.0], y),
-            4 | 5 => self.border(middle, y, long),
+            // A hedge is up to 0.9 m wide.
+            4 | 5 => self.border(middle, y + 0.5 * side, long),
             6..9 => self.garden_wall(middle, y, long),
             _ => {}
         }
