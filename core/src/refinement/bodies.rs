@@ -113,11 +113,7 @@ impl Clusters {
                 }
             }
         }
-        for (c, of_column) in self.of_column.iter_mut().enumerate() {
-            if left.contains(c) {
-                *of_column = NONE;
-            }
-        }
+        left.iter().for_each(|c| self.of_column[c] = NONE);
     }
 
     /// Whether a moving cluster only passes a part of it that could not move.

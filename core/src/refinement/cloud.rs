@@ -129,6 +129,11 @@ impl Cloud {
         inside.then(|| x as usize * self.side + y as usize)
     }
 
+    /// The centre of a column, voxels.
+    pub fn centre_of(&self, column: usize) -> [f32; 2] {
+        [column / self.side, column % self.side].map(|c| c as f32 + 0.5)
+    }
+
     /// Indices of the thinned returns in a column.
     pub fn column(&self, column: usize) -> Range<usize> {
         self.thinned.start[column] as usize..self.thinned.start[column + 1] as usize

@@ -112,7 +112,7 @@ impl<'a> Cluster<'a> {
         let side = self.scans.first.side;
         let mut total = 0;
         'columns: for &c in self.columns {
-            let at = [(c as usize / side) as f32 + 0.5, (c as usize % side) as f32 + 0.5];
+            let at = self.scans.first.centre_of(c as usize);
             let d = motion.of(at);
             let i = (at[0] + d[0] + target.offset[0]) as i32;
             let j = (at[1] + d[1] + target.offset[1]) as i32;

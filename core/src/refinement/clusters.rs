@@ -201,8 +201,7 @@ impl Clusters {
     /// The looks at a column of a moving cluster.
     fn looks(&self, scans: &Scans, column: usize) -> Looks {
         let (first, n) = (scans.first, self.of_column[column]);
-        let at = [column / first.side, column % first.side].map(|c| c as f32 + 0.5);
-        let by = self.found[n as usize].motion.of(at);
+        let by = self.found[n as usize].motion.of(first.centre_of(column));
         // A car may have pulled out a moment ago; a wall cannot have.
         let could_start = scans.could_rather_move(column);
         let acceleration = could_start.then(|| scans.scaled.acceleration(scans.span_s));
@@ -244,7 +243,8 @@ fn grow(
             for b in j.saturating_sub(1)..(j + 2).min(side) {
                 let beside = a * side + b;
                 let worn = |c| scans.worn(&[c as u32], motion, |c| of_column[c] == part);
-                if of_column[beside] == parent && fits(beside) && worn(beside) <= worn_max {
+                let open = of_column[beside] == parent && !given.contains(beside);
+                if open && fits(beside) && worn(beside) <= worn_max {
                     given.insert(beside);
                 }
             }

@@ -81,11 +81,10 @@ impl<'a> Scans<'a> {
     /// sweep, had they come with this motion. `with` tells what else came with them. Nothing is
     /// excused as having been at rest there.
     pub fn worn(&self, columns: &[u32], motion: &Motion, with: impl Fn(usize) -> bool) -> f32 {
-        let side = self.first.side;
         let is_part = |c: usize| with(c) || columns.binary_search(&(c as u32)).is_ok();
         let mut looks = Looks::default();
         for c in columns.iter().map(|c| *c as usize) {
-            let by = motion.of([c / side, c % side].map(|c| c as f32 + 0.5));
+            let by = motion.of(self.first.centre_of(c));
             looks += self.history.looks(self.first, c, by, self.span_s, None, is_part);
         }
         looks.worn()

@@ -23,10 +23,6 @@ impl Section {
         Section { road_half: rng.range(3.1, 4.6), sidewalk: rng.range(1.2, 3.0) }
     }
 
-    pub(crate) fn has_parking(self) -> bool {
-        self.road_half >= Section::WIDE.road_half
-    }
-
     /// Distance from the road's centre line of what is this far from the kerb on a wide sidewalk.
     pub(crate) fn on_sidewalk(self, aside: f64) -> f64 {
         self.road_half + self.sidewalk / Section::WIDE.sidewalk * aside

@@ -99,7 +99,7 @@ impl Recipe {
             ego,
             density: self.density,
             clutter: self.clutter,
-            rig: self.sensors()?,
+            rig: rig(&self.sensor)?,
             threads,
         };
         Ok(Drive::new(seed, options))
@@ -123,15 +123,10 @@ impl Recipe {
         Ok(())
     }
 
-    /// The sensors.
-    fn sensors(&self) -> Result<SensorRig, Error> {
-        self.sensor.parse().map_err(|e: raywake_sim::UnknownRig| Error::Usage(e.to_string()))
-    }
-
     /// The rig as a reader of the drive sees it.
     pub fn rig(&self) -> Result<Rig, Error> {
         let nowhere =
-            Options { sweeps: 0, density: 0.0, rig: self.sensors()?, ..Default::default() };
+            Options { sweeps: 0, density: 0.0, rig: rig(&self.sensor)?, ..Default::default() };
         Ok(Drive::new(0, nowhere).rig())
     }
 
@@ -356,6 +351,11 @@ fn span(rig: &Rig) -> [f64; 2] {
         Timing::Azimuth { span_s } => [-0.5 * span_s, span_s],
         Timing::AtStamp => [0.0, 0.0],
     }
+}
+
+/// The rig of this name.
+pub fn rig(name: &str) -> Result<SensorRig, Error> {
+    name.parse().map_err(|e: raywake_sim::UnknownRig| Error::Usage(e.to_string()))
 }
 
 /// `sensors.txt`, as `raywake_io::source` reads it.

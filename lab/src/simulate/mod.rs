@@ -17,7 +17,7 @@ pub mod truth;
 #[cfg(test)]
 mod tests;
 
-pub use drive::{Motion, Poses, Recipe};
+pub use drive::{Motion, Poses, Recipe, rig};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use drive::State;

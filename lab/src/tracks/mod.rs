@@ -22,6 +22,7 @@ mod tracker;
 
 use crate::labels::Kind;
 use crate::report::{Report, Results, Table};
+use crate::simulate::rig;
 use errors::Errors;
 use evaluate::{OURS, Outcome, PRINTED, evaluate, histories};
 use front_ends::Found;
@@ -30,7 +31,6 @@ use raywake::args::{FlowChoice, FrontEndKind};
 use raywake::error::RunError;
 use raywake_io::Error;
 use raywake_objects::estimate::Estimator;
-use raywake_sim::UnknownRig;
 use recorded::Recorded;
 use simulated::{Drives, Wanted};
 use std::path::PathBuf;
@@ -76,8 +76,7 @@ struct Objects {
 /// Fails if a drive cannot be read or the report cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     let jobs = args.jobs.unwrap_or_else(cores);
-    let rig = args.sensor.parse().map_err(|e: UnknownRig| Error::Usage(e.to_string()))?;
-    let simulated_drives = Drives { seed: args.seed, rig };
+    let simulated_drives = Drives { seed: args.seed, rig: rig(&args.sensor)? };
     let begin = Instant::now();
     let mut drives = Vec::new();
     for path in &args.drives {

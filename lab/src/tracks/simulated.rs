@@ -156,8 +156,7 @@ pub fn simulate(drives: &Drives, wanted: &Wanted) -> Sets {
     sets
 }
 
-/// Drive `number`: three in five go straight on, the others round a corner or stop and
-/// go.
+/// Drive `number`: three in five go straight on, the others round a corner or stop and go.
 fn drive(drives: &Drives, number: u64) -> Drive {
     let mut rng = Rng::split(drives.seed, number);
     let ego = match (rng.unit() * 5.0) as u32 {

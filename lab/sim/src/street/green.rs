@@ -58,6 +58,15 @@ impl Yard<'_> {
         }
     }
 
+    /// What grows in a garden: a tree, a bed or a bush.
+    pub(super) fn plant(&mut self, x: f64, y: f64) {
+        match self.count(0, 9) {
+            0 | 1 => self.tree(x, y),
+            2..5 => self.bed(x, y),
+            _ => self.bush(x, y),
+        }
+    }
+
     /// One to six clumps.
     pub(super) fn bush(&mut self, x: f64, y: f64) {
         for _ in 0..self.count(1, 7) {

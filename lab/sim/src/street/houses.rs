@@ -67,11 +67,7 @@ impl Yard<'_> {
             for _ in 0..self.count(3, 11) {
                 let x = middle + self.rng.range(-0.5, 0.5) * plot;
                 let y = side * self.rng.range(self.edge() + 1.0, front - 0.5);
-                match self.count(0, 9) {
-                    0 | 1 => self.tree(x, y),
-                    2..5 => self.bed(x, y),
-                    _ => self.bush(x, y),
-                }
+                self.plant(x, y);
             }
         }
     }

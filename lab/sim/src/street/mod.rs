@@ -8,7 +8,7 @@ mod green;
 mod houses;
 mod narrow;
 
-use crate::dimensions::CROSS_HALF;
+use crate::dimensions::{CROSS_HALF, Section};
 use crate::ground::Ground;
 use crate::object::{Class, Fixture, Surface};
 use crate::path::Path;
@@ -51,18 +51,19 @@ pub(crate) struct Background {
 /// Builds the background on this ground; `crossing` is x of the crossing road's centre line, m.
 pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Background {
     let mut yard = Yard::new(ground, crossing, rng);
-    let narrow = !ground.section().has_parking();
+    let wide = ground.section() == Section::WIDE;
     for side in [-1.0, 1.0] {
-        if narrow {
-            yard.plots(extent.x, side);
-            yard.houses_along_crossing(extent.y, side);
+        if wide {
+            yard.blocks(extent.x, side)
         } else {
-            yard.blocks(extent.x, side);
-            yard.houses_along_crossing(extent.y, side);
+            yard.plots(extent.x, side)
+        }
+        yard.houses_along_crossing(extent.y, side);
+        if wide {
             yard.kerb_side(extent.x, side);
         }
     }
-    if !narrow {
+    if wide {
         yard.signals();
     }
     Background { fixtures: yard.fixtures, driveways: yard.driveways }

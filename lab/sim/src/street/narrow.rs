@@ -57,11 +57,7 @@ impl Yard<'_> {
         for _ in 0..self.count(0, 8) {
             let x = self.rng.range(from, to);
             let y = side * self.rng.range(self.edge() + 1.2, front);
-            match self.count(0, 9) {
-                0 | 1 => self.tree(x, y),
-                2..5 => self.bed(x, y),
-                _ => self.bush(x, y),
-            }
+            self.plant(x, y);
         }
     }
 

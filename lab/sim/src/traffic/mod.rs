@@ -4,7 +4,7 @@
 mod footprint;
 mod routes;
 
-use crate::dimensions::CROSS_HALF;
+use crate::dimensions::{CROSS_HALF, Section};
 use crate::ego::{LANE, Pace, Plan};
 use crate::models;
 use crate::object::Object;
@@ -43,11 +43,7 @@ pub(crate) fn fill(
     taken.extend(street.fixtures.iter().filter_map(obstacle));
     let mut fill = Fill { objects: Vec::new(), plan, duration_s, taken, rng };
     fill.park(extent.x, density);
-    for place in &street.driveways {
-        if fill.rng.chance(0.6 * density) {
-            fill.try_add(models::car, place.clone());
-        }
-    }
+    fill.park_beside_houses(&street.driveways, density);
     let amount =
         |fixed: f64, per_second: f64| (density * (fixed + per_second * duration_s)).round() as u32;
     // Those that need the most room first.
@@ -156,11 +152,20 @@ impl Fill<'_> {
         }
     }
 
+    /// Cars in some of these places.
+    fn park_beside_houses(&mut self, driveways: &[Path], density: f64) {
+        for place in driveways {
+            if self.rng.chance(0.6 * density) {
+                self.try_add(models::car, place.clone());
+            }
+        }
+    }
+
     /// Parked vehicles on both parking strips, away from the crossing; where there are none, a few
     /// stand half on the sidewalk.
     fn park(&mut self, x: [f64; 2], density: f64) {
         let section = self.plan.section;
-        let (share, aside) = if section.has_parking() { (0.5, 1.1) } else { (0.1, 0.5) };
+        let (share, aside) = if section == Section::WIDE { (0.5, 1.1) } else { (0.1, 0.5) };
         for side in [-1.0, 1.0] {
             let mut at = x[0];
             while at < x[1] {
