@@ -23,6 +23,8 @@ struct Tally {
     of_movers: usize,
     of_status: [usize; Status::ALL.len()],
     over_capacity: u64,
+    /// Status of the last returns of the last pair's first sweep.
+    last: Vec<Status>,
 }
 
 impl Tally {
@@ -40,7 +42,10 @@ impl Tally {
 
 /// Runs sweeps, each after being changed by `edit`.
 fn run(profile: Profile, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
-    let setup = Setup::new(profile, Some(background_filter::SHIPPED.into()));
+    run_with(&Setup::new(profile, Some(background_filter::SHIPPED.into())), drive, edit)
+}
+
+fn run_with(setup: &Setup, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
     let mut pipeline = setup.drive(setup.scalar());
     let (mut tally, mut before) = (Tally::default(), SimSweep::clone(&drive.sweep(0)));
     before.points.clear();
@@ -52,6 +57,8 @@ fn run(profile: Profile, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
         tally.over_capacity += output.dropped.over_capacity;
         if let Some(flows) = output.flows {
             assert_eq!(flows.points.count(), before.points.len());
+            let skipped = before.points.len().saturating_sub(strays().len());
+            tally.last = flows.points.iter().skip(skipped).map(|flow| flow.status).collect();
             for (n, flow) in flows.points.iter().enumerate() {
                 let moves = before.truth.get(n).is_some_and(|t| t.velocity_world != [0.0; 3]);
                 tally.add(&flow, moves);
@@ -105,6 +112,41 @@ fn a_sweep_with_twice_the_capacity_is_thinned_and_says_so() {
     // A still street: in either case next to nothing moves.
     for tally in [&thinned, &whole] {
         assert!(tally.moving[0] * 2000 < tally.returns, "{tally:?}");
+    }
+}
+
+/// Returns that no street has, and what becomes of them beside a vehicle that takes up 1 m.
+fn strays() -> [(Point, Status); 5] {
+    let at = |position| Point { position, ..Point::default() };
+    [
+        (at([0.0; 3]), Status::NoEcho),
+        (at([5.0, f32::NAN, 1.0]), Status::Invalid),
+        (Point { sensor: 7, ..at([5.0, 5.0, 1.0]) }, Status::Invalid),
+        (at([0.4, 0.4, -0.5]), Status::OwnVehicle),
+        (at([90.0, 5.0, 1.0]), Status::OutsideWindow),
+    ]
+}
+
+#[test]
+fn every_return_has_a_status() {
+    let path = Path::from(State { x: -20.0, y: -1.75, yaw: 0.0, speed: 8.0 });
+    let drive =
+        Drive::through(Scene::street(5), path, 5, Options { sweeps: 6, ..Options::default() });
+    let mut setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
+    setup.rig.own_vehicle = Some([[-0.5; 2], [0.5; 2]]);
+    let add = |sweep: &mut SimSweep| sweep.points.extend(strays().map(|(point, _)| point));
+    let all = run_with(&setup, &drive, add);
+    let given: Vec<_> = strays().into_iter().map(|(_, status)| status).collect();
+    assert_eq!(all.last, given);
+    let seen = |s: &Status| all.of(*s) > 0;
+    assert!(Status::ALL.iter().all(|s| seen(s) != (*s == Status::OverCapacity)), "{all:?}");
+    assert_eq!(all.of_status.iter().sum::<usize>(), all.returns);
+    // With room for half of them, each keeps its status or is left out.
+    setup.profile.returns_max = drive.sweep(0).points.len() as u32 / 2;
+    let half = run_with(&setup, &drive, add);
+    assert!(half.of(Status::OverCapacity) * 5 > half.returns * 2, "{half:?}");
+    for (is, given) in half.last.iter().zip(&given) {
+        assert!([*given, Status::OverCapacity].contains(is), "{is:?} instead of {given:?}");
     }
 }
 

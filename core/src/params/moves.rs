@@ -6,7 +6,8 @@ const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simul
                       `--drives 5 --sweeps 20 --seed 9200 --scenery street-fast`, `--drives 3 \
                       --sweeps 20 --seed 9300 --scenery street-cluttered`; `eval --moving 0 --set \
                       could_move_min=-8`), before there were \
-                      `moves_no_history`, `acceleration_mps2` and `passed_worn_min`.";
+                      `moves_no_history`, `acceleration_mps2` and `passed_worn_min`, with the \
+                      encoder trained on 500 drives.";
 
 crate::params! {
     /// How cues become P(moves): logistic regression, one weight per cue.

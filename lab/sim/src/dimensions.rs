@@ -2,12 +2,19 @@
 
 use crate::rng::Rng;
 
+/// Distance of a lane's centre from the centre line of a road without a reservation; half the
+/// width of a lane.
+pub(crate) const LANE: f64 = 1.75;
 /// Half width of the crossing road.
 pub(crate) const CROSS_HALF: f64 = 4.5;
 
 /// Cross-section of the main road, the same on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
+    /// Lanes each way.
+    pub(crate) lanes: u32,
+    /// Half width of what separates the two directions.
+    pub(crate) median_half: f64,
     /// Half width of the road.
     pub(crate) road_half: f64,
     /// Width of a sidewalk.
@@ -16,11 +23,32 @@ pub(crate) struct Section {
 
 impl Section {
     /// A lane and a parking strip on either side, and broad sidewalks.
-    pub(crate) const WIDE: Section = Section { road_half: 5.7, sidewalk: 4.3 };
+    pub(crate) const WIDE: Section =
+        Section { lanes: 1, median_half: 0.0, road_half: 5.7, sidewalk: 4.3 };
 
     /// Two lanes without parking strips; sidewalks on which one or two people fit.
     pub(crate) fn narrow(rng: &mut Rng) -> Section {
-        Section { road_half: rng.range(3.1, 4.6), sidewalk: rng.range(1.2, 3.0) }
+        let (road_half, sidewalk) = (rng.range(3.1, 4.6), rng.range(1.2, 3.0));
+        Section { road_half, sidewalk, ..Section::WIDE }
+    }
+
+    /// Two or three lanes each way, a shoulder, and perhaps a reservation in the middle.
+    pub(crate) fn broad(rng: &mut Rng) -> Section {
+        let lanes = if rng.chance(0.5) { 2 } else { 3 };
+        let median_half = if rng.chance(0.6) { rng.range(0.8, 2.0) } else { 0.0 };
+        let section = Section { lanes, median_half, ..Section::WIDE };
+        let road_half = section.lane(lanes - 1) + LANE + rng.range(0.8, 3.0);
+        Section { road_half, sidewalk: rng.range(1.2, 4.3), ..section }
+    }
+
+    /// Distance of a lane's centre from the road's centre line; lane 0 is the inner one.
+    pub(crate) fn lane(self, lane: u32) -> f64 {
+        self.median_half + LANE + 2.0 * LANE * f64::from(lane)
+    }
+
+    /// That of the outer lane.
+    pub(crate) fn outer_lane(self) -> f64 {
+        self.lane(self.lanes - 1)
     }
 
     /// Distance from the road's centre line of what is this far from the kerb on a wide sidewalk.

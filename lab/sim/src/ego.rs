@@ -1,12 +1,9 @@
 //! Driving behaviour of the vehicle that carries the sensor.
 
-use crate::dimensions::Section;
+use crate::dimensions::{LANE, Section};
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::FRAC_PI_2;
-
-/// Distance of a lane's centre from the road's centre line, m.
-pub(crate) const LANE: f64 = 1.75;
 
 /// What the vehicle does during a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,6 +57,14 @@ pub(crate) struct Plan {
     pub(crate) section: Section,
     /// Pace of the other traffic.
     pub(crate) pace: Pace,
+}
+
+impl Plan {
+    /// The same in a lane of another section, drawn from those that lead the same way.
+    pub(crate) fn on(self, section: Section, rng: &mut Rng) -> Plan {
+        let lane = section.lane((rng.unit() * f64::from(section.lanes)) as u32);
+        Plan { path: self.path.moved(0.0, LANE - lane), section, ..self }
+    }
 }
 
 impl Ego {

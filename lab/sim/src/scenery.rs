@@ -26,6 +26,8 @@ pub enum Scenery {
     StreetCrowded,
     /// A narrow one, with borders of all kinds right beside the sidewalks, for tuning.
     StreetNarrow,
+    /// A broad one, with several lanes each way and the traffic of a road out of town, for tuning.
+    StreetBroad,
     /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,
     /// This particular one.
@@ -47,13 +49,14 @@ impl std::error::Error for UnknownScenery {}
 
 impl Scenery {
     /// The street and its variants.
-    const STREETS: [Scenery; 6] = [
+    const STREETS: [Scenery; 7] = [
         Scenery::Street,
         Scenery::StreetCluttered,
         Scenery::StreetFast,
         Scenery::StreetSlow,
         Scenery::StreetCrowded,
         Scenery::StreetNarrow,
+        Scenery::StreetBroad,
     ];
 
     /// Every scenery.
@@ -71,6 +74,7 @@ impl Scenery {
             Scenery::StreetSlow => "street-slow",
             Scenery::StreetCrowded => "street-crowded",
             Scenery::StreetNarrow => "street-narrow",
+            Scenery::StreetBroad => "street-broad",
             Scenery::Outskirts => "outskirts",
             Scenery::Only(place) => place.name(),
         }
@@ -97,10 +101,14 @@ impl Scenery {
             Scenery::StreetCrowded => (pace, extra) = (Pace::Crowd, Some(Extra::Crowded)),
             Scenery::StreetCluttered => extra = Some(Extra::Cluttered),
             Scenery::StreetNarrow => section = Section::narrow(&mut Rng::split(seed, 11)),
+            Scenery::StreetBroad => {
+                (pace, section) = (Pace::Fast, Section::broad(&mut Rng::split(seed, 11)));
+            }
             _ => {}
         }
         let ego = if pace == Pace::Fast { ego.out_of_town(seed) } else { ego };
-        let plan = Plan { pace, section, ..ego.plan(seed, duration_s) };
+        let plan = Plan { pace, ..ego.plan(seed, duration_s) };
+        let plan = plan.on(section, &mut Rng::split(seed, 12));
         (Scene::around(seed, &plan, duration_s, density, extra), plan.path)
     }
 }
@@ -150,28 +158,48 @@ mod tests {
         }
     }
 
+    /// That nothing on this street passes through what stands on it.
+    fn check_solid(name: &str, scene: &Scene, path: &Path) {
+        // Crowns may hang over a parked car.
+        let crown = |f: &&Fixture| matches!(f.shape, Shape::Ellipsoid { .. });
+        let solid: Vec<_> = scene.fixtures.iter().filter(|f| !crown(f)).cloned().collect();
+        let alone = Scene { objects: Vec::new(), ..scene.clone() };
+        check_clear("the vehicle", &alone, &solid, Some((path, [4.6, 1.9, 2.0])));
+        for object in &scene.objects {
+            let alone = Scene { objects: vec![object.clone()], ..alone.clone() };
+            check_clear(name, &alone, &solid, None);
+        }
+    }
+
     #[test]
     fn narrow_streets_are_built_close_and_nothing_passes_through_what_stands_there() {
-        let wide = Section::WIDE;
         for seed in 0..20 {
             let (scene, path) = Scenery::StreetNarrow.draw(seed, Ego::Any, 6.0, 1.0);
             let section = scene.ground.section();
-            assert!(section.edge() < wide.edge() - 2.0, "{section:?}");
+            assert!(section.edge() < Section::WIDE.edge() - 2.0, "{section:?}");
             let beside = |f: &&Fixture| {
                 (section.edge()..section.edge() + 0.6).contains(&f.pose.translation.y.abs())
             };
             assert!(scene.fixtures.iter().filter(beside).count() > 10);
-            // Crowns may hang over a parked car.
-            let crown = |f: &&Fixture| matches!(f.shape, Shape::Ellipsoid { .. });
-            let solid: Vec<_> = scene.fixtures.iter().filter(|f| !crown(f)).cloned().collect();
-            let alone = Scene { objects: Vec::new(), ..scene.clone() };
-            let ego = Some((&path, [4.6, 1.9, 2.0]));
-            check_clear("the vehicle", &alone, &solid, ego);
-            for object in &scene.objects {
-                let alone = Scene { objects: vec![object.clone()], ..alone.clone() };
-                check_clear(&format!("seed {seed}"), &alone, &solid, None);
+            check_solid(&format!("narrow, seed {seed}"), &scene, &path);
+        }
+    }
+
+    #[test]
+    fn broad_roads_have_traffic_in_every_lane_and_nothing_passes_through_what_stands_there() {
+        let mut lanes = BTreeSet::new();
+        for seed in 0..20 {
+            let (scene, path) = Scenery::StreetBroad.draw(seed, Ego::Any, 6.0, 1.0);
+            let section = scene.ground.section();
+            check_solid(&format!("broad, seed {seed}"), &scene, &path);
+            check_clear("traffic", &scene, &[], Some((&path, [4.6, 1.9, 2.0])));
+            for object in scene.objects.iter().filter(|o| o.class <= Class::Motorcycle) {
+                let y = object.path.at(3.0).y.abs();
+                let near = |lane: &u32| (y - section.lane(*lane)).abs() < 0.1;
+                lanes.extend((0..section.lanes).find(near).map(|lane| (section.lanes, lane)));
             }
         }
+        assert_eq!(lanes, BTreeSet::from([(2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]));
     }
 
     #[test]

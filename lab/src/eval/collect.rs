@@ -129,6 +129,11 @@ impl<'a> Collector<'a> {
         self.objects.at(seen.first.frame)
     }
 
+    /// Distance from a point of the first sweep's vehicle frame to what moves, m.
+    pub fn mover_m(&self, seen: &PairData, at: DVec3) -> f32 {
+        self.objects.mover_m(seen.first.frame, at)
+    }
+
     /// Rows of the first sweep's solid columns. With exact truth, a column belongs to whatever its
     /// returns above the ground hit. Columns without such returns, or without exact truth, belong
     /// to the box that contains their centre; with exact truth they are then of the road below it
@@ -203,7 +208,7 @@ impl<'a> Collector<'a> {
             track: object.map_or(0, |p| p.track + 1),
             in_view,
             motion: object.map_or(0, |p| motion(p.motion)),
-            mover_m: Present::mover_m(self.present(seen), flat(flow)),
+            mover_m: self.mover_m(seen, flat(flow)),
             basis: flow.basis as u8,
             flow_x: flow.displacement_m[0],
             flow_y: flow.displacement_m[1],

@@ -255,7 +255,8 @@ impl<'a> Judges<'a> {
         self.points.pair(seen, present, exact.as_deref())?;
         let rows = self.collector.rows(seen, exact.as_deref());
         let reported = self.collector.returns_reported_moving(seen);
-        self.returns.pair(seen, present, exact.as_deref(), &reported)?;
+        let mover_m = |at| self.collector.mover_m(seen, at);
+        self.returns.pair(seen, present, exact.as_deref(), &reported, mover_m)?;
         self.panels.consider(seen, &rows, present);
         Ok(rows)
     }

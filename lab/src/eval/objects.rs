@@ -1,10 +1,15 @@
 //! The labelled objects of every sweep, with their motion to the next.
 
-use crate::labels::{Footprint, Kind, Labels, Motion, trajectories};
+use crate::labels::trajectory::State;
+use crate::labels::{Footprint, Kind, Labels, Motion, Trajectory, trajectories};
 use glam::DVec3;
 use raywake_core::pose::Pose;
 use raywake_io::source::Source;
 use std::collections::HashMap;
+
+/// How long before its first box and after its last one a moving object is taken to move on as it
+/// does there, s: the car of `kitti_raw_0005` is seen for 0.4 s before its first box.
+const CONTINUED_S: f64 = 0.5;
 
 /// An object in one sweep.
 #[derive(Clone, Debug)]
@@ -28,13 +33,6 @@ pub struct Present {
 }
 
 impl Present {
-    /// Distance from a point of the vehicle frame to the nearest box of a moving object, seen from
-    /// above, m; infinite if nothing moves.
-    pub fn mover_m(all: &[Present], at: DVec3) -> f32 {
-        let movers = all.iter().filter(|p| p.motion == Motion::Moving);
-        movers.map(|p| p.footprint.distance_m(at)).fold(f64::INFINITY, f64::min) as f32
-    }
-
     /// Whether a point of the vehicle frame lies in the box, or within `margin_m` of it.
     pub fn holds(&self, at: DVec3, margin_m: f64) -> bool {
         self.footprint.holds(at, margin_m)
@@ -52,18 +50,30 @@ pub struct Step {
 }
 
 /// The objects of a drive by frame.
-pub struct Objects(HashMap<u64, Vec<Present>>);
+pub struct Objects {
+    frames: HashMap<u64, Vec<Present>>,
+    /// Where something moves, seen from above, vehicle frame; also shortly before its first box and
+    /// after its last one, unless the labels are exact: a box may begin late.
+    movers: HashMap<u64, Vec<Footprint>>,
+}
 
 impl Objects {
     /// From labels, with the poses of the drive.
     pub fn new(labels: &Labels, source: &dyn Source) -> Objects {
         let mut frames: HashMap<u64, Vec<Present>> = HashMap::new();
+        let mut movers: HashMap<u64, Vec<Footprint>> = HashMap::new();
         let all = trajectories(labels, source);
         for (index, (track, trajectory)) in labels.tracks.iter().zip(&all).enumerate() {
             // Parts of a track that was cut are named after the whole.
             let id = track.id.split('/').next().filter(|_| labels.exact);
             let id = id.and_then(|id| id.parse().ok());
             let states = trajectory.states();
+            if !labels.exact {
+                for (frame, vehicle_from_box) in continued(trajectory, source) {
+                    let footprint = Footprint::new(vehicle_from_box, track.size[0], track.size[1]);
+                    movers.entry(frame).or_default().push(footprint);
+                }
+            }
             for (n, state) in states.iter().enumerate() {
                 let now = track.boxes[&state.frame];
                 let step = trajectory.step(state.frame).map(|smooth| {
@@ -72,11 +82,15 @@ impl Objects {
                     let raw = there * (state.world_from_vehicle * now).inverse();
                     Step { raw, smooth }
                 });
+                let footprint = Footprint::new(now, track.size[0], track.size[1]);
+                if state.motion == Motion::Moving {
+                    movers.entry(state.frame).or_default().push(footprint);
+                }
                 frames.entry(state.frame).or_default().push(Present {
                     track: index as u32,
                     id,
                     kind: track.kind,
-                    footprint: Footprint::new(now, track.size[0], track.size[1]),
+                    footprint,
                     vehicle_from_box: now,
                     size: track.size,
                     motion: state.motion,
@@ -84,11 +98,72 @@ impl Objects {
                 });
             }
         }
-        Objects(frames)
+        Objects { frames, movers }
     }
 
     /// Objects in the sweep of `frame`, in the order of the labels.
     pub fn at(&self, frame: u64) -> &[Present] {
-        self.0.get(&frame).map_or(&[], Vec::as_slice)
+        self.frames.get(&frame).map_or(&[], Vec::as_slice)
+    }
+
+    /// Distance from a point of the vehicle frame of a sweep to the nearest moving object, seen
+    /// from above, m; infinite if nothing moves.
+    pub fn mover_m(&self, frame: u64, at: DVec3) -> f32 {
+        let movers = self.movers.get(&frame).into_iter().flatten();
+        movers.map(|footprint| footprint.distance_m(at)).fold(f64::INFINITY, f64::min) as f32
+    }
+}
+
+/// Where an object that moves at its first or last box was up to [`CONTINUED_S`] before or will be
+/// after it: the sweep's frame, and the box in its vehicle frame.
+fn continued(trajectory: &Trajectory, source: &dyn Source) -> Vec<(u64, Pose)> {
+    let [Some(first), Some(last)] = [trajectory.states().first(), trajectory.states().last()]
+    else {
+        return Vec::new();
+    };
+    let before = (0..first.index).map(|index| (first, index));
+    let after = (last.index + 1..source.len()).map(|index| (last, index));
+    let placed = |(state, index): (&State, usize)| {
+        let since_s = source.stamp_s(index) - state.stamp_s;
+        let counts = state.motion == Motion::Moving && since_s.abs() <= CONTINUED_S;
+        counts.then(|| {
+            let Pose { rotation, translation } = state.world_from_box;
+            let there = Pose::new(rotation, translation + state.velocity * since_s);
+            (source.frame(index), source.pose(index).inverse() * there)
+        })
+    };
+    before.chain(after).filter_map(placed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::labels::tests::{Road, labels_of, track};
+
+    /// How far from what moves the place of a car is that is labelled in frames 10 to 15 only and
+    /// drives at `speed`, in another frame.
+    fn mover_m(frame: u64, speed: f64, exact: bool) -> f32 {
+        let moments = (0..30).map(|n| 0.1 * f64::from(n));
+        let road = Road::of(moments.map(|t| (t, Pose::planar(2.0 * t, 0.0, 0.0, 0.0))));
+        let at = |frame: u64| {
+            let (t, pose) = road.moment(frame as usize);
+            pose.inverse() * Pose::planar(10.0, speed * t, 0.0, 1.5)
+        };
+        let car = track("a", (10..16).map(|frame| (frame, at(frame))));
+        let objects = Objects::new(&Labels { exact, ..labels_of([car]) }, &road);
+        objects.mover_m(frame, at(frame).translation)
+    }
+
+    #[test]
+    fn movers_go_on_beyond_their_boxes_for_a_moment() {
+        for frame in 5..=20 {
+            assert_eq!(mover_m(frame, 5.0, false), 0.0, "{frame}");
+        }
+        for frame in [3, 22] {
+            assert_eq!(mover_m(frame, 5.0, false), f32::INFINITY, "{frame}");
+        }
+        // Exact boxes begin when they do, and what is parked does not move before.
+        assert_eq!((mover_m(12, 5.0, true), mover_m(8, 5.0, true)), (0.0, f32::INFINITY));
+        assert_eq!(mover_m(8, 0.0, false), f32::INFINITY);
     }
 }

@@ -15,7 +15,7 @@ mod tracklets;
 pub mod trajectory;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use footprint::Footprint;
 pub use kind::kind;

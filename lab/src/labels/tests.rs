@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Sweeps without clouds.
-pub(super) struct Road(Overview);
+pub(crate) struct Road(Overview);
 
 impl Road {
     /// Stamps, s, and poses of the vehicle.
@@ -40,12 +40,12 @@ impl Source for Road {
 }
 
 /// A car with these boxes.
-pub(super) fn track(id: &str, boxes: impl Iterator<Item = (u64, Pose)>) -> Track {
+pub(crate) fn track(id: &str, boxes: impl Iterator<Item = (u64, Pose)>) -> Track {
     let (id, class, kind) = (id.into(), "Car".into(), Kind::Car);
     Track { id, class, kind, size: [4.0, 2.0, 1.5], boxes: boxes.collect() }
 }
 
-pub(super) fn labels_of(tracks: impl IntoIterator<Item = Track>) -> Labels {
+pub(crate) fn labels_of(tracks: impl IntoIterator<Item = Track>) -> Labels {
     let tracks = tracks.into_iter().collect();
     Labels { tracks, view: View::All, exact: false, notes: Vec::new() }
 }

@@ -2,7 +2,7 @@
 
 use super::drives::Labelled;
 use super::recorded::Recorded;
-use super::simulated::Simulated;
+use super::simulated::{RIGS, Simulated};
 use crate::grid::Grid;
 use glam::DVec3;
 use raywake_core::params::{Frame, Profile};
@@ -34,12 +34,28 @@ pub struct Inputs {
     /// Recorded drives to hold out instead: names of their folders.
     #[arg(long, value_name = "NAME", num_args = 1.., requires = "data")]
     pub held_out: Vec<String>,
-    /// Whether every third simulated street is a cluttered one.
+    /// Whether half of the simulated streets are [`SCENERIES`] other than the plain one.
     #[arg(skip)]
-    pub cluttered: bool,
+    pub varied: bool,
     /// Frame of the grid.
     #[arg(skip)]
     pub frame: Frame,
+}
+
+/// Varied streets, in rotation.
+const SCENERIES: [Scenery; 6] = [
+    Scenery::Street,
+    Scenery::StreetCluttered,
+    Scenery::Street,
+    Scenery::StreetNarrow,
+    Scenery::Street,
+    Scenery::StreetBroad,
+];
+
+/// A drive's scenery. The rigs rotate as well ([`Simulated::drawn`]): every one drives everywhere.
+fn varied(drive: u64) -> Scenery {
+    let turns = drive / RIGS.len() as u64;
+    SCENERIES[((drive + turns) % SCENERIES.len() as u64) as usize]
 }
 
 /// A drive that can be opened.
@@ -137,10 +153,7 @@ impl Inputs {
         let mut drive: Box<dyn Labelled> = match &planned.material {
             // One more sweep, for the last pair.
             Material::Simulated(n) => {
-                let scenery = match self.cluttered && n % 3 == 2 {
-                    true => Scenery::StreetCluttered,
-                    false => Scenery::Street,
-                };
+                let scenery = if self.varied { varied(*n) } else { Scenery::Street };
                 Box::new(Simulated::drawn(self.seed, *n, wanted + 1, scenery))
             }
             Material::Recorded(path) => Box::new(Recorded::open(path)?),
@@ -182,6 +195,13 @@ mod tests {
     fn held_out(inputs: &Inputs) -> Vec<usize> {
         let plan = inputs.plan().unwrap();
         (0..plan.len()).filter(|n| plan[*n].held_out).collect()
+    }
+
+    #[test]
+    fn every_rig_drives_through_every_scenery() {
+        let of = |n| (n % RIGS.len() as u64, varied(n).name());
+        let combined: std::collections::BTreeSet<_> = (0..36).map(of).collect();
+        assert_eq!(combined.len(), 6 * 4, "{combined:?}");
     }
 
     #[test]

@@ -40,7 +40,7 @@ impl Simulated {
 
 /// Rigs in rotation: every second drive has KITTI's, since the shipped numbers are for similar
 /// levels and ranges.
-const RIGS: [fn() -> SensorRig; 6] = [
+pub const RIGS: [fn() -> SensorRig; 6] = [
     SensorRig::hdl64,
     SensorRig::vlp32x2,
     SensorRig::hdl64,

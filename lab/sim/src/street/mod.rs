@@ -1,5 +1,6 @@
 //! The street's background, block by block: closed rows of houses, houses behind gardens, parks.
 
+mod broad;
 mod cluttered;
 mod crowded;
 mod fronts;
@@ -51,20 +52,26 @@ pub(crate) struct Background {
 /// Builds the background on this ground; `crossing` is x of the crossing road's centre line, m.
 pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Background {
     let mut yard = Yard::new(ground, crossing, rng);
-    let wide = ground.section() == Section::WIDE;
+    let section = ground.section();
+    let (wide, broad) = (section == Section::WIDE, section.lanes > 1);
     for side in [-1.0, 1.0] {
         if wide {
             yard.blocks(extent.x, side)
+        } else if broad {
+            yard.roadside(extent.x, side)
         } else {
             yard.plots(extent.x, side)
         }
         yard.houses_along_crossing(extent.y, side);
-        if wide {
+        if wide || broad {
             yard.kerb_side(extent.x, side);
         }
     }
-    if wide {
+    if wide || broad {
         yard.signals();
+    }
+    if section.median_half > 0.0 {
+        yard.central_reservation(extent.x);
     }
     Background { fixtures: yard.fixtures, driveways: yard.driveways }
 }

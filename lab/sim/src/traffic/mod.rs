@@ -5,7 +5,7 @@ mod footprint;
 mod routes;
 
 use crate::dimensions::{CROSS_HALF, Section};
-use crate::ego::{LANE, Pace, Plan};
+use crate::ego::{Pace, Plan};
 use crate::models;
 use crate::object::Object;
 use crate::path::Path;
@@ -145,7 +145,7 @@ impl Fill<'_> {
             Some(self.plan.path.clone())
         } else {
             let (model, _) = self.draw();
-            self.mover(model, |r| r.along(LANE, 2.5, 6.5))
+            self.mover(model, |r| r.along(r.plan.section.outer_lane(), 2.5, 6.5))
         };
         if let Some(slow) = slow {
             self.mover(models::car, |r| r.past(&slow));

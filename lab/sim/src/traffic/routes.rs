@@ -1,6 +1,7 @@
 //! Paths of traffic: along, across, turning, braking, overtaking.
 
-use crate::ego::{LANE, Pace, Plan};
+use crate::dimensions::LANE;
+use crate::ego::{Pace, Plan};
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -56,10 +57,20 @@ impl Routes<'_> {
         }
     }
 
+    /// Distance of one of the lanes from the main road's centre line, m.
+    fn lane(&mut self) -> f64 {
+        let section = self.plan.section;
+        match section.lanes {
+            1 => section.lane(0),
+            lanes => section.lane((self.rng.unit() * f64::from(lanes)) as u32),
+        }
+    }
+
     /// At out-of-town speeds, on either road.
     fn fast(&mut self, fastest: f64) -> Path {
         if self.rng.chance(0.7) {
-            self.along(LANE, 15.0, fastest)
+            let lane = self.lane();
+            self.along(lane, 15.0, fastest)
         } else {
             self.crossing(LANE, 15.0, fastest)
         }
@@ -75,7 +86,8 @@ impl Routes<'_> {
     }
 
     pub(super) fn rider(&mut self) -> Path {
-        let beside = f64::min(3.1, self.plan.section.road_half - 0.5);
+        let section = self.plan.section;
+        let beside = f64::min(section.outer_lane() + 1.35, section.road_half - 0.5);
         if self.rng.chance(0.75) {
             self.along(beside, 3.0, 6.0)
         } else {
@@ -114,10 +126,11 @@ impl Routes<'_> {
         let sign = if other.yaw.cos() < 0.0 { -1.0 } else { 1.0 };
         let speed = (other.speed + self.rng.range(4.0, 8.0)).max(7.0);
         let aside = self.rng.range(2.8, 3.5);
+        let outer = self.plan.section.outer_lane();
         // It leaves the lane this far behind the other, and returns to it this far ahead.
         let (gap, change_s) = (self.rng.range(9.0, 14.0), self.rng.range(2.2, 3.5));
         let before = gap / (speed - other.speed) + change_s;
-        let start = State { x: other.x - sign * speed * before, ..lane(sign, LANE, speed) };
+        let start = State { x: other.x - sign * speed * before, ..lane(sign, outer, speed) };
         // Straight until then: the first leg extends back indefinitely.
         let path = Path::starting(abreast - before, start).then(0.0, 0.0, 0.0);
         let path = path.then_shift(aside, change_s);
@@ -179,7 +192,7 @@ impl Routes<'_> {
         let yaw = if sign > 0.0 { 0.0 } else { PI };
         match (self.rng.unit() * 10.0) as u32 {
             0 => Path::stationary(x, y, self.rng.range(-PI, PI)),
-            1..4 => {
+            1..4 if self.plan.section.median_half == 0.0 => {
                 let before = t * self.rng.unit();
                 let start = State { x: x - sign * speed * before, y, yaw, speed };
                 // A quarter turn left or right onto the road, back along the other sidewalk.

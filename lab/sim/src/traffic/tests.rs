@@ -1,7 +1,8 @@
 //! Checks that all the manoeuvres that traffic should show occur.
 
 use super::routes::Routes;
-use crate::ego::{Ego, LANE};
+use crate::dimensions::LANE;
+use crate::ego::Ego;
 use crate::object::Class;
 use crate::path::{Path, State};
 use crate::rng::Rng;

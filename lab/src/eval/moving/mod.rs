@@ -154,7 +154,8 @@ pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
     );
     let note = "Parked objects and whatever is unlabelled are static; slow objects do not count. \
         IoU is that of SemanticKITTI's moving object segmentation, over all returns in view. False \
-        motion is divided by its distance from the nearest box of a mover, seen from above. The \
+        motion is divided by its distance from the nearest box of a mover, seen from above; \
+        recorded boxes of movers are continued for 0.5 s before the first and after the last. The \
         road below objects, which exact truth distinguishes and boxes do not, counts in a row of \
         its own.";
     Table::new("moving-or-not", caption, &COLUMNS, rows).note(note)

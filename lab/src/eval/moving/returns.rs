@@ -42,13 +42,15 @@ impl ReturnVerdicts {
     }
 
     /// Counts the returns of a pair's first sweep, with whether each was reported as moving,
-    /// against exact truth if there is any. Fails if its classes cannot be read.
+    /// against exact truth if there is any. `mover_m` gives how far a point of the vehicle frame is
+    /// from what moves. Fails if its classes cannot be read.
     pub fn pair(
         &mut self,
         seen: &PairData,
         present: &[Present],
         exact: Option<&[PointTruth]>,
         reported: &[bool],
+        mover_m: impl Fn(DVec3) -> f32,
     ) -> Result<(), Error> {
         let next_from_world = seen.then.inverse();
         for (n, (point, reported)) in seen.first.points.iter().zip(reported).enumerate() {
@@ -64,7 +66,7 @@ impl ReturnVerdicts {
             let stays = |by| self.view.holds((next_from_world * by).transform(at));
             let Some(moves) = moves(object).filter(|_| there.is_some_and(stays)) else { continue };
             // The distance matters only for false motion.
-            let mover_m = if *reported { Present::mover_m(present, at) } else { 0.0 };
+            let mover_m = if *reported { mover_m(at) } else { 0.0 };
             self.counts.in_boxes.add(moves, *reported, mover_m);
         }
         let Some(semantic) = &self.semantic else { return Ok(()) };
@@ -207,7 +209,7 @@ mod tests {
         let seen = PairData { index: 0, first, then: Pose::IDENTITY, dt_s: 0.1, columns, points };
         let semantic = Some(Semantic(scratch.path().to_path_buf()));
         let mut verdicts = ReturnVerdicts::new(View::Nowhere, 0.0, semantic);
-        verdicts.pair(&seen, &[], None, &[true, false, true, false]).unwrap();
+        verdicts.pair(&seen, &[], None, &[true, false, true, false], |_| f32::INFINITY).unwrap();
         let classes: Vec<_> = verdicts.counts.classes.into_iter().collect();
         assert_eq!(classes, [(0, [1, 0]), (10, [1, 1]), (50, [2, 1])]);
         let encoded = verdicts.counts.encoded[&50];

@@ -72,7 +72,7 @@ struct Report {
 
 /// Trains, writes and reports.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let inputs = Inputs { cluttered: true, ..args.inputs.clone() };
+    let inputs = Inputs { varied: true, ..args.inputs.clone() };
     let (text, report) = learn(&inputs, args)?;
     args.outputs.write(&text, &report)
 }

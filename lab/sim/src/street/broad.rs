@@ -1,0 +1,99 @@
+//! A broad road with several lanes each way: rails, walls and borders along it and perhaps down its
+//! middle, trees, bushes and houses behind them, or open land.
+
+use super::Yard;
+use crate::object::{Class, Surface};
+
+impl Yard<'_> {
+    /// One side of the road, in stretches of one kind each.
+    pub(super) fn roadside(&mut self, x: [f64; 2], side: f64) {
+        let mut at = x[0];
+        while at < x[1] {
+            let end = at + self.rng.range(30.0, 100.0);
+            let (stretch, y) = ([at, end], side * (self.edge() + self.rng.range(0.2, 0.5)));
+            match self.count(0, 10) {
+                0..2 => {}
+                2..4 => self.along(stretch, |yard, x, long| yard.rail(x, y, long)),
+                4..6 => self.noise_wall(stretch, y),
+                // A hedge is up to 0.9 m wide.
+                6 => self.along(stretch, |yard, x, long| yard.border(x, y + 0.5 * side, long)),
+                7 => self.along(stretch, |yard, x, long| {
+                    yard.gappy_border([x - 0.5 * long + 3.0, x + 0.5 * long - 3.0], y)
+                }),
+                _ => self.gardens(stretch, side),
+            }
+            self.open_land(stretch, side);
+            at = end;
+        }
+    }
+
+    /// What separates the two directions, where they are not side by side.
+    pub(super) fn central_reservation(&mut self, x: [f64; 2]) {
+        let mut at = x[0];
+        while at < x[1] {
+            let end = at + self.rng.range(40.0, 120.0);
+            match self.count(0, 5) {
+                0 | 1 => self.along([at, end], |yard, x, long| yard.rail(x, 0.0, long)),
+                2 => self.along([at, end], |yard, x, long| yard.hedge(x, 0.0, long)),
+                3 => {
+                    let size = [0.4, self.rng.range(0.6, 1.1)];
+                    self.along([at, end], |yard, x, long| {
+                        let size = [long, size[0], size[1]];
+                        yard.cuboid(Class::Fixture, [x, 0.0], size, 0.0, Surface::matt(0.45));
+                    });
+                }
+                _ => {}
+            }
+            at = end;
+        }
+    }
+
+    /// Calls `build` with the middle and the length of every piece of a stretch, about 20 m long,
+    /// that keeps clear of the crossing.
+    fn along(&mut self, [from, to]: [f64; 2], mut build: impl FnMut(&mut Self, f64, f64)) {
+        let pieces = ((to - from) / 20.0).ceil();
+        let long = (to - from) / pieces;
+        for n in 0..pieces as u32 {
+            let middle = from + (f64::from(n) + 0.5) * long;
+            if !self.in_crossing(middle, 0.5 * long) {
+                build(self, middle, long);
+            }
+        }
+    }
+
+    /// A rail on posts.
+    fn rail(&mut self, x: f64, y: f64, long: f64) {
+        let steel = Surface::matt(self.rng.range(0.4, 0.7));
+        let lift = self.rng.range(0.3, 0.5);
+        self.raised(Class::Fixture, [x, y, lift], [long, 0.06, 0.32], 0.0, steel);
+        for post in 0..(long / 2.5) as u32 {
+            let at = x - 0.5 * long + 2.5 * f64::from(post);
+            self.cuboid(Class::Fixture, [at, y], [0.1, 0.1, lift + 0.3], 0.0, steel);
+        }
+    }
+
+    /// A tall wall of one height.
+    fn noise_wall(&mut self, stretch: [f64; 2], y: f64) {
+        let size = [self.rng.range(0.12, 0.3), self.rng.range(2.0, 5.0)];
+        let panels = Surface::matt(self.rng.range(0.25, 0.6));
+        self.along(stretch, |yard, x, long| {
+            yard.cuboid(Class::Fixture, [x, y], [long, size[0], size[1]], 0.0, panels);
+        });
+    }
+
+    /// A few trees, bushes and posts up to 30 m from the road.
+    fn open_land(&mut self, [from, to]: [f64; 2], side: f64) {
+        let dense = self.rng.unit() * self.rng.unit();
+        for _ in 0..((to - from) * dense) as u32 {
+            let (x, back) = (self.rng.range(from, to), self.rng.unit());
+            let y = side * (self.edge() + 2.5 + 28.0 * back * back);
+            if self.in_crossing(x, 3.0) {
+                continue;
+            }
+            match self.count(0, 8) {
+                0 => self.pole(x, y, 0.1, 8.0),
+                _ => self.plant(x, y),
+            }
+        }
+    }
+}
