@@ -1,6 +1,6 @@
-//! Sweeps that do not occur in a street: too many returns, all in one place, without ground, ground
-//! only, along walls, in a crowd. Results stay bounded and counted, and static structure stays
-//! static.
+//! Sweeps that do not occur in a street: too many returns, invalid or missing ones, all in one
+//! place, without ground, ground only, along walls, in a crowd. Results stay bounded and counted,
+//! and static structure stays static.
 
 #![forbid(unsafe_code)]
 
@@ -23,8 +23,6 @@ struct Tally {
     of_movers: usize,
     of_status: [usize; Status::ALL.len()],
     over_capacity: u64,
-    /// Status of the last returns of the last pair's first sweep.
-    last: Vec<Status>,
 }
 
 impl Tally {
@@ -42,10 +40,12 @@ impl Tally {
 
 /// Runs sweeps, each after being changed by `edit`.
 fn run(profile: Profile, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
-    run_with(&Setup::new(profile, Some(background_filter::SHIPPED.into())), drive, edit)
+    run_with(&Setup::new(profile, Some(background_filter::SHIPPED.into())), drive, edit).0
 }
 
-fn run_with(setup: &Setup, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
+/// The same, with the status of every return of the last pair's first sweep.
+fn run_with(setup: &Setup, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> (Tally, Vec<Status>) {
+    let mut statuses = Vec::new();
     let mut pipeline = setup.drive(setup.scalar());
     let (mut tally, mut before) = (Tally::default(), SimSweep::clone(&drive.sweep(0)));
     before.points.clear();
@@ -57,8 +57,7 @@ fn run_with(setup: &Setup, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally
         tally.over_capacity += output.dropped.over_capacity;
         if let Some(flows) = output.flows {
             assert_eq!(flows.points.count(), before.points.len());
-            let skipped = before.points.len().saturating_sub(strays().len());
-            tally.last = flows.points.iter().skip(skipped).map(|flow| flow.status).collect();
+            statuses = flows.points.iter().map(|flow| flow.status).collect();
             for (n, flow) in flows.points.iter().enumerate() {
                 let moves = before.truth.get(n).is_some_and(|t| t.velocity_world != [0.0; 3]);
                 tally.add(&flow, moves);
@@ -66,7 +65,7 @@ fn run_with(setup: &Setup, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally
         }
         before = now;
     }
-    tally
+    (tally, statuses)
 }
 
 fn along(x: f64, y: f64, speed: f64) -> Path {
@@ -115,7 +114,7 @@ fn a_sweep_with_twice_the_capacity_is_thinned_and_says_so() {
     }
 }
 
-/// Returns that no street has, and what becomes of them beside a vehicle that takes up 1 m.
+/// Returns that no street has, and what becomes of them if the vehicle takes up 1 m.
 fn strays() -> [(Point, Status); 5] {
     let at = |position| Point { position, ..Point::default() };
     [
@@ -129,24 +128,33 @@ fn strays() -> [(Point, Status); 5] {
 
 #[test]
 fn every_return_has_a_status() {
+    const TIMES: usize = 20;
     let path = Path::from(State { x: -20.0, y: -1.75, yaw: 0.0, speed: 8.0 });
     let drive =
         Drive::through(Scene::street(5), path, 5, Options { sweeps: 6, ..Options::default() });
     let mut setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
     setup.rig.own_vehicle = Some([[-0.5; 2], [0.5; 2]]);
-    let add = |sweep: &mut SimSweep| sweep.points.extend(strays().map(|(point, _)| point));
-    let all = run_with(&setup, &drive, add);
-    let given: Vec<_> = strays().into_iter().map(|(_, status)| status).collect();
-    assert_eq!(all.last, given);
-    let seen = |s: &Status| all.of(*s) > 0;
-    assert!(Status::ALL.iter().all(|s| seen(s) != (*s == Status::OverCapacity)), "{all:?}");
-    assert_eq!(all.of_status.iter().sum::<usize>(), all.returns);
+    let add = |sweep: &mut SimSweep| {
+        (0..TIMES).for_each(|_| sweep.points.extend(strays().map(|(point, _)| point)));
+    };
+    // The strays' statuses, round by round.
+    let of_strays = |all: &[Status]| all[all.len() - TIMES * strays().len()..].to_vec();
+    let (all, statuses) = run_with(&setup, &drive, add);
+    for (n, status) in of_strays(&statuses).into_iter().enumerate() {
+        assert_eq!(status, strays()[n % strays().len()].1, "{n}");
+    }
+    for status in Status::ALL {
+        assert_eq!(all.of(status) > 0, status != Status::OverCapacity, "{status:?} in {all:?}");
+    }
     // With room for half of them, each keeps its status or is left out.
     setup.profile.returns_max = drive.sweep(0).points.len() as u32 / 2;
-    let half = run_with(&setup, &drive, add);
-    assert!(half.of(Status::OverCapacity) * 5 > half.returns * 2, "{half:?}");
-    for (is, given) in half.last.iter().zip(&given) {
-        assert!([*given, Status::OverCapacity].contains(is), "{is:?} instead of {given:?}");
+    let (_, statuses) = run_with(&setup, &drive, add);
+    let statuses = of_strays(&statuses);
+    for (n, (_, given)) in strays().into_iter().enumerate() {
+        let (kept, left_out): (Vec<&Status>, Vec<&Status>) =
+            statuses.iter().skip(n).step_by(strays().len()).partition(|s| **s == given);
+        assert!(!kept.is_empty() && !left_out.is_empty(), "{given:?}");
+        assert!(left_out.iter().all(|s| **s == Status::OverCapacity), "{left_out:?}");
     }
 }
 

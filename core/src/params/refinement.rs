@@ -156,9 +156,8 @@ crate::params! {
         pub worn_max: f32 = 0.5, "", (0 to 1),
             "2 % of simulated moving columns are in such clusters, and a quarter of the static \
              ones far from any mover (before `acceleration_mps2`). Columns reported as moving \
-             (`raywake-lab sim --sweeps 25 --seed 9001`, `vlp32x2` and `hdl64`; with the encoder \
-             trained on 500 drives), precision and recall if that holds for clusters alone, and \
-             here: narrow streets (`--drives 4`) \
+             (`raywake-lab sim --sweeps 25 --seed 9001`, `vlp32x2` and `hdl64`), precision and \
+             recall if that holds for clusters alone, and here: narrow streets (`--drives 4`) \
              94.3 and 96.0 %, 96.7 and 96.1; plain ones (`--drives 3`) 96.0 and 97.4, 96.1 and \
              97.4; slow ones 95.9 and 93.1, 96.2 and 93.1; crowded ones (`--drives 2`) 98.4 and \
              89.9 both times; residential ones (`--drives 6 --seed 8181`) 90.9 and \

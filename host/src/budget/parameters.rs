@@ -13,7 +13,8 @@ const HEAD: &str = "\
 Printed by `raywake budget --parameters`; a test compares it with this file. A parameter is set by
 `--set NAME=VALUE` or, in a file given with `--config`, by a key of this name, at the top level or
 in a table named after its group. Defaults are those of profile `hdl64`, followed by the profiles
-that differ. Figures are described in RESULTS.md.
+that differ. Figures are described in RESULTS.md; they were measured when a value was chosen, not
+again with every change since.
 ";
 
 const OBJECTS: &str = "

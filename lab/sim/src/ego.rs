@@ -60,9 +60,9 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// The same in a lane of another section, drawn from those that lead the same way.
+    /// The same in any of the lanes of a road of this section that lead the same way.
     pub(crate) fn on(self, section: Section, rng: &mut Rng) -> Plan {
-        let lane = section.lane((rng.unit() * f64::from(section.lanes)) as u32);
+        let lane = section.drawn_lane(rng);
         Plan { path: self.path.moved(0.0, LANE - lane), section, ..self }
     }
 }

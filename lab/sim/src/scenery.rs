@@ -13,10 +13,11 @@ use std::str::FromStr;
 /// The scene to drive through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scenery {
-    /// A street with houses, trees and parked cars: the one used for training.
+    /// A street with houses, trees and parked cars: the one that all training uses.
     #[default]
     Street,
-    /// The same with more of what makes static structure appear to move, for tuning.
+    /// The same with more of what makes static structure appear to move, for tuning and the
+    /// encoder's training.
     StreetCluttered,
     /// The same with the traffic of a road out of town, 15 to 36 m/s, for tuning.
     StreetFast,
@@ -24,9 +25,11 @@ pub enum Scenery {
     StreetSlow,
     /// A slow one with crowds of people, standing and strolling among furniture, for tuning.
     StreetCrowded,
-    /// A narrow one, with borders of all kinds right beside the sidewalks, for tuning.
+    /// A narrow one, with borders of all kinds right beside the sidewalks, for tuning and the
+    /// encoder's training.
     StreetNarrow,
-    /// A broad one, with several lanes each way and the traffic of a road out of town, for tuning.
+    /// A broad one, with several lanes each way and the traffic of a road out of town, for tuning
+    /// and the encoder's training.
     StreetBroad,
     /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,
@@ -127,8 +130,12 @@ mod tests {
     use super::*;
     use crate::collisions::check_clear;
     use crate::object::{Class, Fixture, Object};
+    use crate::path::State;
     use crate::shape::Shape;
     use std::collections::BTreeSet;
+
+    /// Length, width and height of the vehicle, m.
+    const EGO: [f64; 3] = [4.6, 1.9, 2.0];
 
     #[test]
     fn names() {
@@ -150,7 +157,7 @@ mod tests {
             assert_eq!(plain.fixtures[..], scene.fixtures[..plain.fixtures.len()]);
             assert!(more.len() > 200, "{}", more.len());
             let empty = Scene { objects: Vec::new(), ..scene.clone() };
-            check_clear("the vehicle", &empty, more, Some((&path, [4.6, 1.9, 2.0])));
+            check_clear("the vehicle", &empty, more, Some((&path, EGO)));
             for object in scene.objects {
                 let alone = Scene { objects: vec![object], ..empty.clone() };
                 check_clear(&format!("{scenery:?}, seed {seed}"), &alone, more, None);
@@ -158,13 +165,13 @@ mod tests {
         }
     }
 
-    /// That nothing on this street passes through what stands on it.
+    /// That nothing on this street passes through what stands on it, leaves aside.
     fn check_solid(name: &str, scene: &Scene, path: &Path) {
-        // Crowns may hang over a parked car.
-        let crown = |f: &&Fixture| matches!(f.shape, Shape::Ellipsoid { .. });
-        let solid: Vec<_> = scene.fixtures.iter().filter(|f| !crown(f)).cloned().collect();
+        // Crowns may hang over a parked car, bushes over a sidewalk.
+        let leaves = |f: &&Fixture| matches!(f.shape, Shape::Ellipsoid { .. });
+        let solid: Vec<_> = scene.fixtures.iter().filter(|f| !leaves(f)).cloned().collect();
         let alone = Scene { objects: Vec::new(), ..scene.clone() };
-        check_clear("the vehicle", &alone, &solid, Some((path, [4.6, 1.9, 2.0])));
+        check_clear("the vehicle", &alone, &solid, Some((path, EGO)));
         for object in &scene.objects {
             let alone = Scene { objects: vec![object.clone()], ..alone.clone() };
             check_clear(name, &alone, &solid, None);
@@ -187,19 +194,29 @@ mod tests {
 
     #[test]
     fn broad_roads_have_traffic_in_every_lane_and_nothing_passes_through_what_stands_there() {
-        let mut lanes = BTreeSet::new();
+        let (mut lanes, mut own, mut medians) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
         for seed in 0..20 {
             let (scene, path) = Scenery::StreetBroad.draw(seed, Ego::Any, 6.0, 1.0);
             let section = scene.ground.section();
             check_solid(&format!("broad, seed {seed}"), &scene, &path);
-            check_clear("traffic", &scene, &[], Some((&path, [4.6, 1.9, 2.0])));
-            for object in scene.objects.iter().filter(|o| o.class <= Class::Motorcycle) {
-                let y = object.path.at(3.0).y.abs();
-                let near = |lane: &u32| (y - section.lane(*lane)).abs() < 0.1;
-                lanes.extend((0..section.lanes).find(near).map(|lane| (section.lanes, lane)));
-            }
+            check_clear(&format!("broad, seed {seed}"), &scene, &[], Some((&path, EGO)));
+            let lane_of = |path: &Path| {
+                let State { y, yaw, speed, .. } = path.at(3.0);
+                // On the right-hand side, and neither crossing nor overtaking.
+                let beside = -y * yaw.cos().signum();
+                let near = |lane: &u32| (beside - section.lane(*lane)).abs() < 1e-6;
+                let lane = (0..section.lanes).find(near).map(|lane| (section.lanes, lane));
+                lane.filter(|_| speed >= 15.0 && yaw.sin().abs() < 1e-6)
+            };
+            lanes.extend(scene.objects.iter().filter_map(|o| lane_of(&o.path)));
+            own.extend(lane_of(&path));
+            let in_middle = |f: &&Fixture| f.pose.translation.y == 0.0;
+            medians
+                .insert((section.median_half > 0.0, scene.fixtures.iter().any(|f| in_middle(&f))));
         }
-        assert_eq!(lanes, BTreeSet::from([(2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]));
+        let every = BTreeSet::from([(2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]);
+        assert_eq!((&lanes, &own), (&every, &every));
+        assert_eq!(medians, BTreeSet::from([(false, false), (true, true)]));
     }
 
     #[test]

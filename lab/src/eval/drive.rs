@@ -33,7 +33,7 @@ const WAITING: usize = 2;
 
 /// Version of the meaning of rows and facts: those of another version are redone. Raise it with
 /// every such change.
-const ROWS: u32 = 4;
+const ROWS: u32 = 5;
 
 /// Settings shared by all drives of an evaluation.
 #[derive(Clone)]

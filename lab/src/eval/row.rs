@@ -136,7 +136,7 @@ row! {
     motion: u8,
     /// Whether by exact truth only the ground below its object's box was hit.
     below: bool,
-    /// Distance from the column's centre to the nearest box of a moving object, seen from above, m:
+    /// Distance from the column's centre to where something moves, seen from above, m:
     /// 0 within it, infinite if nothing moves.
     mover_m: f32,
     /// Occupied voxels of the column: its weight in the dissertation's tables.

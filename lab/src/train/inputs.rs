@@ -34,7 +34,7 @@ pub struct Inputs {
     /// Recorded drives to hold out instead: names of their folders.
     #[arg(long, value_name = "NAME", num_args = 1.., requires = "data")]
     pub held_out: Vec<String>,
-    /// Whether half of the simulated streets are [`SCENERIES`] other than the plain one.
+    /// Whether simulated streets rotate over several sceneries instead of the plain one.
     #[arg(skip)]
     pub varied: bool,
     /// Frame of the grid.
@@ -200,8 +200,10 @@ mod tests {
     #[test]
     fn every_rig_drives_through_every_scenery() {
         let of = |n| (n % RIGS.len() as u64, varied(n).name());
-        let combined: std::collections::BTreeSet<_> = (0..36).map(of).collect();
-        assert_eq!(combined.len(), 6 * 4, "{combined:?}");
+        let all = (RIGS.len() * SCENERIES.len()) as u64;
+        let combined: std::collections::BTreeSet<_> = (0..all).map(of).collect();
+        let names: std::collections::BTreeSet<_> = SCENERIES.iter().map(|s| s.name()).collect();
+        assert_eq!(combined.len(), RIGS.len() * names.len(), "{combined:?}");
     }
 
     #[test]

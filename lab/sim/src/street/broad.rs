@@ -1,5 +1,5 @@
-//! A broad road with several lanes each way: rails, walls and borders along it and perhaps down its
-//! middle, trees, bushes and houses behind them, or open land.
+//! A broad road with several lanes each way: guard rails, noise walls and borders along it and
+//! perhaps on its median, with trees, bushes and houses behind them.
 
 use super::Yard;
 use crate::object::{Class, Surface};
@@ -13,10 +13,11 @@ impl Yard<'_> {
             let (stretch, y) = ([at, end], side * (self.edge() + self.rng.range(0.2, 0.5)));
             match self.count(0, 10) {
                 0..2 => {}
-                2..4 => self.along(stretch, |yard, x, long| yard.rail(x, y, long)),
+                2..4 => self.along(stretch, |yard, x, long| yard.guard_rail(x, y, long)),
                 4..6 => self.noise_wall(stretch, y),
-                // A hedge is up to 0.9 m wide.
+                // A trimmed hedge is up to 0.9 m wide.
                 6 => self.along(stretch, |yard, x, long| yard.border(x, y + 0.5 * side, long)),
+                // Some of these are longer than they are told.
                 7 => self.along(stretch, |yard, x, long| {
                     yard.gappy_border([x - 0.5 * long + 3.0, x + 0.5 * long - 3.0], y)
                 }),
@@ -27,13 +28,13 @@ impl Yard<'_> {
         }
     }
 
-    /// What separates the two directions, where they are not side by side.
-    pub(super) fn central_reservation(&mut self, x: [f64; 2]) {
+    /// What stands on the median.
+    pub(super) fn median(&mut self, x: [f64; 2]) {
         let mut at = x[0];
         while at < x[1] {
             let end = at + self.rng.range(40.0, 120.0);
             match self.count(0, 5) {
-                0 | 1 => self.along([at, end], |yard, x, long| yard.rail(x, 0.0, long)),
+                0 | 1 => self.along([at, end], |yard, x, long| yard.guard_rail(x, 0.0, long)),
                 2 => self.along([at, end], |yard, x, long| yard.hedge(x, 0.0, long)),
                 3 => {
                     let size = [0.4, self.rng.range(0.6, 1.1)];
@@ -61,8 +62,8 @@ impl Yard<'_> {
         }
     }
 
-    /// A rail on posts.
-    fn rail(&mut self, x: f64, y: f64, long: f64) {
+    /// A piece of a guard rail on posts, as high and as worn as it happens to be.
+    fn guard_rail(&mut self, x: f64, y: f64, long: f64) {
         let steel = Surface::matt(self.rng.range(0.4, 0.7));
         let lift = self.rng.range(0.3, 0.5);
         self.raised(Class::Fixture, [x, y, lift], [long, 0.06, 0.32], 0.0, steel);
@@ -72,7 +73,7 @@ impl Yard<'_> {
         }
     }
 
-    /// A tall wall of one height.
+    /// A noise wall of one height.
     fn noise_wall(&mut self, stretch: [f64; 2], y: f64) {
         let size = [self.rng.range(0.12, 0.3), self.rng.range(2.0, 5.0)];
         let panels = Surface::matt(self.rng.range(0.25, 0.6));
@@ -81,7 +82,7 @@ impl Yard<'_> {
         });
     }
 
-    /// A few trees, bushes and posts up to 30 m from the road.
+    /// Up to one tree, bush or post a metre, up to 30 m behind the sidewalk.
     fn open_land(&mut self, [from, to]: [f64; 2], side: f64) {
         let dense = self.rng.unit() * self.rng.unit();
         for _ in 0..((to - from) * dense) as u32 {

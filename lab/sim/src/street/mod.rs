@@ -1,4 +1,5 @@
-//! The street's background, block by block: closed rows of houses, houses behind gardens, parks.
+//! The street's background. A plain street has it block by block: closed rows of houses, houses
+//! behind gardens, parks.
 
 mod broad;
 mod cluttered;
@@ -71,7 +72,7 @@ pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rn
         yard.signals();
     }
     if section.median_half > 0.0 {
-        yard.central_reservation(extent.x);
+        yard.median(extent.x);
     }
     Background { fixtures: yard.fixtures, driveways: yard.driveways }
 }

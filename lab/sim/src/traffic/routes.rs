@@ -57,19 +57,10 @@ impl Routes<'_> {
         }
     }
 
-    /// Distance of one of the lanes from the main road's centre line, m.
-    fn lane(&mut self) -> f64 {
-        let section = self.plan.section;
-        match section.lanes {
-            1 => section.lane(0),
-            lanes => section.lane((self.rng.unit() * f64::from(lanes)) as u32),
-        }
-    }
-
     /// At out-of-town speeds, on either road.
     fn fast(&mut self, fastest: f64) -> Path {
         if self.rng.chance(0.7) {
-            let lane = self.lane();
+            let lane = self.plan.section.drawn_lane(self.rng);
             self.along(lane, 15.0, fastest)
         } else {
             self.crossing(LANE, 15.0, fastest)
@@ -119,7 +110,8 @@ impl Routes<'_> {
         path.then_to_speed(if later < 0.8 { 0.0 } else { later }, rate, EASE_S)
     }
 
-    /// Past another vehicle on the main road and back into the lane, a few m/s faster.
+    /// Past another vehicle in the outer lane of the main road and back into that lane, a few m/s
+    /// faster. If the other one is in an inner lane, the way is not clear.
     pub(super) fn past(&mut self, slow: &Path) -> Path {
         let abreast = self.rng.range(0.0, self.duration_s);
         let other = slow.at(abreast);
@@ -192,6 +184,7 @@ impl Routes<'_> {
         let yaw = if sign > 0.0 { 0.0 } else { PI };
         match (self.rng.unit() * 10.0) as u32 {
             0 => Path::stationary(x, y, self.rng.range(-PI, PI)),
+            // Nobody climbs over what stands on a median.
             1..4 if self.plan.section.median_half == 0.0 => {
                 let before = t * self.rng.unit();
                 let start = State { x: x - sign * speed * before, y, yaw, speed };
@@ -207,7 +200,7 @@ impl Routes<'_> {
     }
 }
 
-/// Start in a lane of the main road, heading along +x or -x, on the right-hand side.
+/// Start `beside` the centre line of the main road, heading along +x or -x, on the right-hand side.
 fn lane(sign: f64, beside: f64, speed: f64) -> State {
     State { x: 0.0, y: -sign * beside, yaw: if sign > 0.0 { 0.0 } else { PI }, speed }
 }

@@ -58,7 +58,7 @@ fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
 }
 
 /// All variants, in the order listed.
-pub const VARIANTS: [Variant; 31] = [
+pub const VARIANTS: [Variant; 30] = [
     of(BASE, "as given", |p| p),
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
     of("refine-2", "refined by 2 sweeps", |p| Profile { refinement_sweeps: 2, ..p }),
@@ -81,10 +81,6 @@ pub const VARIANTS: [Variant; 31] = [
     }),
     of("encoder-no-passing", "nothing that is only passed is left behind", |mut p| {
         p.refinement.passed_worn_min = 1.0;
-        p
-    }),
-    of("encoder-no-start", "nothing may have started from rest", |mut p| {
-        p.refinement.acceleration_mps2 = 0.0;
         p
     }),
     of("encoder-no-body", "the encoder completes no body", |mut p| {

@@ -15,6 +15,7 @@ pub use returns::{ReturnCounts, ReturnVerdicts, Semantic, semantic_kitti};
 
 use super::calibration::truth;
 use super::facts::Facts;
+use super::objects::CONTINUED_S;
 use crate::labels::trajectory::MOVING_MPS;
 use crate::report::{Cell, Table, TableRow};
 use serde::{Deserialize, Serialize};
@@ -152,13 +153,16 @@ pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
          {MOVING_MPS} m/s or more and are reported as moving, with a displacement and a velocity \
          of at least that."
     );
-    let note = "Parked objects and whatever is unlabelled are static; slow objects do not count. \
+    let note = format!(
+        "Parked objects and whatever is unlabelled are static; slow objects do not count. \
         IoU is that of SemanticKITTI's moving object segmentation, over all returns in view. False \
         motion is divided by its distance from the nearest box of a mover, seen from above; \
-        recorded boxes of movers are continued for 0.5 s before the first and after the last. The \
+        recorded boxes of movers are continued for {CONTINUED_S} s before the first and after the \
+        last. The \
         road below objects, which exact truth distinguishes and boxes do not, counts in a row of \
-        its own.";
-    Table::new("moving-or-not", caption, &COLUMNS, rows).note(note)
+        its own."
+    );
+    Table::new("moving-or-not", caption, &COLUMNS, rows).note(&note)
 }
 
 /// Pairs of sweeps of drives with boxes.
