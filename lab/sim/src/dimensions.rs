@@ -32,13 +32,13 @@ impl Section {
         Section { road_half, sidewalk, ..Section::WIDE }
     }
 
-    /// Two or three lanes each way, a shoulder, and perhaps a median.
+    /// Two or three lanes each way, a shoulder as wide as a parking strip, and perhaps a median.
     pub(crate) fn broad(rng: &mut Rng) -> Section {
         let lanes = if rng.chance(0.5) { 2 } else { 3 };
         let median_half = if rng.chance(0.6) { rng.range(0.8, 2.0) } else { 0.0 };
         let section = Section { lanes, median_half, ..Section::WIDE };
-        let road_half = section.outer_lane() + LANE + rng.range(0.8, 3.0);
-        Section { road_half, sidewalk: rng.range(1.2, 4.3), ..section }
+        let road_half = section.outer_lane() + LANE + rng.range(2.2, 3.4);
+        Section { road_half, sidewalk: rng.range(2.4, 4.3), ..section }
     }
 
     /// Distance of a lane's centre from the road's centre line; lane 0 is the inner one.

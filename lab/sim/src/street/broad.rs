@@ -1,5 +1,5 @@
 //! A broad road with several lanes each way: guard rails, noise walls and borders along it and
-//! perhaps on its median, with trees, bushes and houses behind them.
+//! perhaps on its median, open land behind them; or houses behind gardens.
 
 use super::Yard;
 use crate::object::{Class, Surface};
@@ -11,9 +11,10 @@ impl Yard<'_> {
         while at < x[1] {
             let end = at + self.rng.range(30.0, 100.0);
             let (stretch, y) = ([at, end], side * (self.edge() + self.rng.range(0.2, 0.5)));
+            at = end;
             match self.count(0, 10) {
                 0..2 => {}
-                2..4 => self.along(stretch, |yard, x, long| yard.guard_rail(x, y, long)),
+                2..4 => self.guard_rail(stretch, y),
                 4..6 => self.noise_wall(stretch, y),
                 // A trimmed hedge is up to 0.9 m wide.
                 6 => self.along(stretch, |yard, x, long| yard.border(x, y + 0.5 * side, long)),
@@ -21,10 +22,12 @@ impl Yard<'_> {
                 7 => self.along(stretch, |yard, x, long| {
                     yard.gappy_border([x - 0.5 * long + 3.0, x + 0.5 * long - 3.0], y)
                 }),
-                _ => self.gardens(stretch, side),
+                _ => {
+                    self.gardens(stretch, side);
+                    continue;
+                }
             }
             self.open_land(stretch, side);
-            at = end;
         }
     }
 
@@ -34,7 +37,7 @@ impl Yard<'_> {
         while at < x[1] {
             let end = at + self.rng.range(40.0, 120.0);
             match self.count(0, 5) {
-                0 | 1 => self.along([at, end], |yard, x, long| yard.guard_rail(x, 0.0, long)),
+                0 | 1 => self.guard_rail([at, end], 0.0),
                 2 => self.along([at, end], |yard, x, long| yard.hedge(x, 0.0, long)),
                 3 => {
                     let size = [0.4, self.rng.range(0.6, 1.1)];
@@ -62,15 +65,17 @@ impl Yard<'_> {
         }
     }
 
-    /// A piece of a guard rail on posts, as high and as worn as it happens to be.
-    fn guard_rail(&mut self, x: f64, y: f64, long: f64) {
+    /// A guard rail on posts.
+    fn guard_rail(&mut self, stretch: [f64; 2], y: f64) {
         let steel = Surface::matt(self.rng.range(0.4, 0.7));
         let lift = self.rng.range(0.3, 0.5);
-        self.raised(Class::Fixture, [x, y, lift], [long, 0.06, 0.32], 0.0, steel);
-        for post in 0..(long / 2.5) as u32 {
-            let at = x - 0.5 * long + 2.5 * f64::from(post);
-            self.cuboid(Class::Fixture, [at, y], [0.1, 0.1, lift + 0.3], 0.0, steel);
-        }
+        self.along(stretch, |yard, x, long| {
+            yard.raised(Class::Fixture, [x, y, lift], [long, 0.06, 0.32], 0.0, steel);
+            for post in 0..(long / 2.5) as u32 {
+                let at = x - 0.5 * long + 2.5 * f64::from(post);
+                yard.cuboid(Class::Fixture, [at, y], [0.1, 0.1, lift + 0.3], 0.0, steel);
+            }
+        });
     }
 
     /// A noise wall of one height.

@@ -74,7 +74,8 @@ impl Yard<'_> {
 
     pub(super) fn houses_along_crossing(&mut self, y: [f64; 2], side: f64) {
         for (sign, end) in [(-1.0, -y[0]), (1.0, y[1])] {
-            let mut at = 27.0;
+            // Behind the houses along the main road.
+            let mut at = f64::max(27.0, self.edge() + 17.0);
             while at < end {
                 let length = self.rng.range(8.0, 22.0);
                 let front = CROSS_HALF + 3.0 + self.rng.range(0.0, 3.0);

@@ -139,9 +139,11 @@ impl Fill<'_> {
     }
 
     /// A slow vehicle and a car that passes it; in one case in three the slow one is the vehicle
-    /// that carries the sensors.
+    /// that carries the sensors, if that is in the outer lane.
     fn overtaking(&mut self) {
-        let slow = if self.rng.chance(0.33) {
+        let outer = -self.plan.section.outer_lane();
+        let is_outer = (self.plan.path.at(0.0).y - outer).abs() < 0.1;
+        let slow = if self.rng.chance(0.33) && is_outer {
             Some(self.plan.path.clone())
         } else {
             let (model, _) = self.draw();

@@ -111,7 +111,7 @@ impl Routes<'_> {
     }
 
     /// Past another vehicle in the outer lane of the main road and back into that lane, a few m/s
-    /// faster. If the other one is in an inner lane, the way is not clear.
+    /// faster.
     pub(super) fn past(&mut self, slow: &Path) -> Path {
         let abreast = self.rng.range(0.0, self.duration_s);
         let other = slow.at(abreast);
