@@ -5,6 +5,8 @@ use crate::rng::Rng;
 /// Half the width of a lane: how far the inner one's centre is from the centre line of a road
 /// without a median.
 pub(crate) const LANE: f64 = 1.75;
+/// Length, width and height of the vehicle that carries the sensors.
+pub(crate) const VEHICLE: [f64; 3] = [4.6, 1.9, 2.2];
 /// Half width of the crossing road.
 pub(crate) const CROSS_HALF: f64 = 4.5;
 

@@ -55,6 +55,8 @@ pub(crate) struct Plan {
     pub(crate) crossing: f64,
     /// Cross-section of the main road.
     pub(crate) section: Section,
+    /// Distance of the vehicle's lane from the road's centre line, m.
+    pub(crate) lane: f64,
     /// Pace of the other traffic.
     pub(crate) pace: Pace,
 }
@@ -63,7 +65,7 @@ impl Plan {
     /// The same in any of the lanes of a road of this section that lead the same way.
     pub(crate) fn on(self, section: Section, rng: &mut Rng) -> Plan {
         let lane = section.drawn_lane(rng);
-        Plan { path: self.path.moved(0.0, LANE - lane), section, ..self }
+        Plan { path: self.path.moved(0.0, self.lane - lane), section, lane, ..self }
     }
 }
 
@@ -74,7 +76,13 @@ impl Ego {
         let mut rng = Rng::split(seed, 0);
         let crossing = rng.sign() * rng.range(18.0, 60.0);
         let start = |speed: f64| Path::from(State { x: 0.0, y: -LANE, yaw: 0.0, speed });
-        let on = |path, crossing| Plan { path, crossing, section: Section::WIDE, pace: Pace::Town };
+        let on = |path, crossing| Plan {
+            path,
+            crossing,
+            section: Section::WIDE,
+            lane: LANE,
+            pace: Pace::Town,
+        };
         match self {
             Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
             Ego::Standing => on(Path::stationary(0.0, -LANE, 0.0), crossing),

@@ -28,8 +28,8 @@ pub enum Scenery {
     /// A narrow one, with borders of all kinds right beside the sidewalks, for tuning and the
     /// encoder's training.
     StreetNarrow,
-    /// A broad one, with several lanes each way and the traffic of a road out of town, for tuning
-    /// and the encoder's training.
+    /// A broad one, with several lanes each way and the traffic of a road out of town, for the
+    /// encoder's training.
     StreetBroad,
     /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,
@@ -129,13 +129,11 @@ impl FromStr for Scenery {
 mod tests {
     use super::*;
     use crate::collisions::check_clear;
+    use crate::dimensions::VEHICLE;
     use crate::object::{Class, Fixture, Object};
     use crate::path::State;
     use crate::shape::Shape;
     use std::collections::BTreeSet;
-
-    /// Length, width and height of the vehicle, m.
-    const EGO: [f64; 3] = [4.6, 1.9, 2.0];
 
     #[test]
     fn names() {
@@ -157,7 +155,7 @@ mod tests {
             assert_eq!(plain.fixtures[..], scene.fixtures[..plain.fixtures.len()]);
             assert!(more.len() > 200, "{}", more.len());
             let empty = Scene { objects: Vec::new(), ..scene.clone() };
-            check_clear("the vehicle", &empty, more, Some((&path, EGO)));
+            check_clear("the vehicle", &empty, more, Some((&path, VEHICLE)));
             for object in scene.objects {
                 let alone = Scene { objects: vec![object], ..empty.clone() };
                 check_clear(&format!("{scenery:?}, seed {seed}"), &alone, more, None);
@@ -171,7 +169,7 @@ mod tests {
         let leaves = |f: &&Fixture| matches!(f.shape, Shape::Ellipsoid { .. });
         let solid: Vec<_> = scene.fixtures.iter().filter(|f| !leaves(f)).cloned().collect();
         let alone = Scene { objects: Vec::new(), ..scene.clone() };
-        check_clear("the vehicle", &alone, &solid, Some((path, EGO)));
+        check_clear("the vehicle", &alone, &solid, Some((path, VEHICLE)));
         for object in &scene.objects {
             let alone = Scene { objects: vec![object.clone()], ..alone.clone() };
             check_clear(name, &alone, &solid, None);
@@ -199,7 +197,7 @@ mod tests {
             let (scene, path) = Scenery::StreetBroad.draw(seed, Ego::Any, 6.0, 1.0);
             let section = scene.ground.section();
             check_solid(&format!("broad, seed {seed}"), &scene, &path);
-            check_clear(&format!("broad, seed {seed}"), &scene, &[], Some((&path, EGO)));
+            check_clear(&format!("broad, seed {seed}"), &scene, &[], Some((&path, VEHICLE)));
             let lane_of = |path: &Path| {
                 let State { y, yaw, speed, .. } = path.at(3.0);
                 // On the right-hand side, and neither crossing nor overtaking.

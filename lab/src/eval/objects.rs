@@ -54,16 +54,16 @@ pub struct Step {
 /// The objects of a drive by frame.
 pub struct Objects {
     frames: HashMap<u64, Vec<Present>>,
-    /// Where something moves, seen from above, vehicle frame; also shortly before its first box and
-    /// after its last one, unless the labels are exact: a box may begin late.
-    movers: HashMap<u64, Vec<Footprint>>,
+    /// Where something moves shortly before its first box and after its last one, seen from above,
+    /// vehicle frame; nothing if the labels are exact: others may begin late.
+    continued: HashMap<u64, Vec<Footprint>>,
 }
 
 impl Objects {
     /// From labels, with the poses of the drive.
     pub fn new(labels: &Labels, source: &dyn Source) -> Objects {
         let mut frames: HashMap<u64, Vec<Present>> = HashMap::new();
-        let mut movers: HashMap<u64, Vec<Footprint>> = HashMap::new();
+        let mut beyond: HashMap<u64, Vec<Footprint>> = HashMap::new();
         let all = trajectories(labels, source);
         for (index, (track, trajectory)) in labels.tracks.iter().zip(&all).enumerate() {
             // Parts of a track that was cut are named after the whole.
@@ -73,7 +73,7 @@ impl Objects {
             if !labels.exact {
                 for (frame, vehicle_from_box) in continued(trajectory, source) {
                     let footprint = Footprint::new(vehicle_from_box, track.size[0], track.size[1]);
-                    movers.entry(frame).or_default().push(footprint);
+                    beyond.entry(frame).or_default().push(footprint);
                 }
             }
             for (n, state) in states.iter().enumerate() {
@@ -84,15 +84,11 @@ impl Objects {
                     let raw = there * (state.world_from_vehicle * now).inverse();
                     Step { raw, smooth }
                 });
-                let footprint = Footprint::new(now, track.size[0], track.size[1]);
-                if state.motion == Motion::Moving {
-                    movers.entry(state.frame).or_default().push(footprint);
-                }
                 frames.entry(state.frame).or_default().push(Present {
                     track: index as u32,
                     id,
                     kind: track.kind,
-                    footprint,
+                    footprint: Footprint::new(now, track.size[0], track.size[1]),
                     vehicle_from_box: now,
                     size: track.size,
                     motion: state.motion,
@@ -100,7 +96,7 @@ impl Objects {
                 });
             }
         }
-        Objects { frames, movers }
+        Objects { frames, continued: beyond }
     }
 
     /// Objects in the sweep of `frame`, in the order of the labels.
@@ -111,7 +107,9 @@ impl Objects {
     /// Distance from a point of the vehicle frame of a sweep to the nearest moving object, seen
     /// from above, m; infinite if nothing moves.
     pub fn mover_m(&self, frame: u64, at: DVec3) -> f32 {
-        let movers = self.movers.get(&frame).into_iter().flatten();
+        let movers = self.at(frame).iter().filter(|p| p.motion == Motion::Moving);
+        let continued = self.continued.get(&frame).into_iter().flatten();
+        let movers = movers.map(|p| &p.footprint).chain(continued);
         movers.map(|footprint| footprint.distance_m(at)).fold(f64::INFINITY, f64::min) as f32
     }
 }
@@ -142,9 +140,9 @@ mod tests {
     use super::*;
     use crate::labels::tests::{Road, labels_of, track};
 
-    /// How far from what moves the place of a car is that is labelled in frames 10 to 15 only and
-    /// drives at `speed`, in another frame.
-    fn mover_m(frame: u64, speed: f64, exact: bool) -> f32 {
+    /// How far from what moves a place is that is `ahead` of the middle of a car, in a frame. The
+    /// car is labelled in frames 10 to 15 only, and drives at `speed`.
+    fn mover_m(frame: u64, ahead: f64, speed: f64, exact: bool) -> f32 {
         let moments = (0..30).map(|n| 0.1 * f64::from(n));
         let road = Road::of(moments.map(|t| (t, Pose::planar(2.0 * t, 0.0, 0.0, 0.0))));
         let at = |frame: u64| {
@@ -153,19 +151,24 @@ mod tests {
         };
         let car = track("a", (10..16).map(|frame| (frame, at(frame))));
         let objects = Objects::new(&Labels { exact, ..labels_of([car]) }, &road);
-        objects.mover_m(frame, at(frame).translation)
+        objects.mover_m(frame, at(frame).translation + ahead * DVec3::Y)
     }
 
     #[test]
     fn movers_go_on_beyond_their_boxes_for_a_moment() {
         for frame in 5..=20 {
-            assert_eq!(mover_m(frame, 5.0, false), 0.0, "{frame}");
+            // The car is 4 m long.
+            for end in [-1.0, 1.0] {
+                assert_eq!(mover_m(frame, 1.9 * end, 5.0, false), 0.0, "{frame}");
+                assert!(mover_m(frame, 2.1 * end, 5.0, false) > 0.0, "{frame}");
+            }
         }
-        for frame in [3, 22] {
-            assert_eq!(mover_m(frame, 5.0, false), f32::INFINITY, "{frame}");
+        for frame in [4, 21] {
+            assert_eq!(mover_m(frame, 0.0, 5.0, false), f32::INFINITY, "{frame}");
         }
         // Exact boxes begin when they do, and what is parked does not move before.
-        assert_eq!((mover_m(12, 5.0, true), mover_m(8, 5.0, true)), (0.0, f32::INFINITY));
-        assert_eq!(mover_m(8, 0.0, false), f32::INFINITY);
+        let exact = |frame| mover_m(frame, 0.0, 5.0, true);
+        assert_eq!((exact(12), exact(8)), (0.0, f32::INFINITY));
+        assert_eq!(mover_m(8, 0.0, 0.0, false), f32::INFINITY);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::drives::Labelled;
 use super::recorded::Recorded;
-use super::simulated::{RIGS, Simulated};
+use super::simulated::{Simulated, varied};
 use crate::grid::Grid;
 use glam::DVec3;
 use raywake_core::params::{Frame, Profile};
@@ -40,22 +40,6 @@ pub struct Inputs {
     /// Frame of the grid.
     #[arg(skip)]
     pub frame: Frame,
-}
-
-/// Varied streets, in rotation.
-const SCENERIES: [Scenery; 6] = [
-    Scenery::Street,
-    Scenery::StreetCluttered,
-    Scenery::Street,
-    Scenery::StreetNarrow,
-    Scenery::Street,
-    Scenery::StreetBroad,
-];
-
-/// A drive's scenery. The rigs rotate as well ([`Simulated::drawn`]): every one drives everywhere.
-fn varied(drive: u64) -> Scenery {
-    let turns = drive / RIGS.len() as u64;
-    SCENERIES[((drive + turns) % SCENERIES.len() as u64) as usize]
 }
 
 /// A drive that can be opened.
@@ -195,15 +179,6 @@ mod tests {
     fn held_out(inputs: &Inputs) -> Vec<usize> {
         let plan = inputs.plan().unwrap();
         (0..plan.len()).filter(|n| plan[*n].held_out).collect()
-    }
-
-    #[test]
-    fn every_rig_drives_through_every_scenery() {
-        let of = |n| (n % RIGS.len() as u64, varied(n).name());
-        let all = (RIGS.len() * SCENERIES.len()) as u64;
-        let combined: std::collections::BTreeSet<_> = (0..all).map(of).collect();
-        let names: std::collections::BTreeSet<_> = SCENERIES.iter().map(|s| s.name()).collect();
-        assert_eq!(combined.len(), RIGS.len() * names.len(), "{combined:?}");
     }
 
     #[test]

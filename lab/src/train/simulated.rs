@@ -40,7 +40,7 @@ impl Simulated {
 
 /// Rigs in rotation: every second drive has KITTI's, since the shipped numbers are for similar
 /// levels and ranges.
-pub const RIGS: [fn() -> SensorRig; 6] = [
+const RIGS: [fn() -> SensorRig; 6] = [
     SensorRig::hdl64,
     SensorRig::vlp32x2,
     SensorRig::hdl64,
@@ -48,6 +48,22 @@ pub const RIGS: [fn() -> SensorRig; 6] = [
     SensorRig::hdl64,
     SensorRig::beam128,
 ];
+
+/// Varied streets, in rotation.
+const SCENERIES: [Scenery; 6] = [
+    Scenery::Street,
+    Scenery::StreetCluttered,
+    Scenery::Street,
+    Scenery::StreetNarrow,
+    Scenery::Street,
+    Scenery::StreetBroad,
+];
+
+/// A drive's scenery. The [`RIGS`] rotate as well: every one drives everywhere.
+pub fn varied(drive: u64) -> Scenery {
+    let turns = drive / RIGS.len() as u64;
+    SCENERIES[((drive + turns) % SCENERIES.len() as u64) as usize]
+}
 
 /// A rig whose sensors vary a little in noise, strength, pitch and height, so that training does
 /// not come to rely on one particular unit.
@@ -132,5 +148,25 @@ impl Labelled for Simulated {
 
     fn sees(&self, _: DVec3) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn every_rig_drives_through_every_scenery_and_half_of_the_streets_are_plain() {
+        let mut drives: BTreeMap<_, usize> = BTreeMap::new();
+        for n in 0..(RIGS.len() * SCENERIES.len()) as u64 {
+            *drives.entry((n % RIGS.len() as u64, varied(n).name())).or_default() += 1;
+        }
+        for rig in 0..RIGS.len() as u64 {
+            let of = |scenery: Scenery| drives.get(&(rig, scenery.name())).copied();
+            assert_eq!(of(Scenery::Street), Some(SCENERIES.len() / 2), "{drives:?}");
+            let others = [Scenery::StreetCluttered, Scenery::StreetNarrow, Scenery::StreetBroad];
+            assert_eq!(others.map(of), [Some(1); 3], "{drives:?}");
+        }
     }
 }

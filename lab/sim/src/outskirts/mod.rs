@@ -19,6 +19,7 @@ mod site;
 #[cfg(test)]
 mod tests;
 
+use crate::dimensions::VEHICLE;
 use crate::ground::Ground;
 use crate::path::Path;
 use crate::rng::Rng;
@@ -29,9 +30,7 @@ use raywake_core::pose::Pose;
 use site::Site;
 use std::f64::consts::PI;
 
-/// Length, width and height of the vehicle that carries the sensors, m.
-const VEHICLE: [f64; 3] = [4.6, 1.9, 2.2];
-/// Margin kept clear around it, m.
+/// Margin kept clear around the vehicle, m.
 const MARGIN_M: f64 = 0.35;
 /// How far ahead and behind the scene extends, m.
 const VIEW_M: f64 = 120.0;

@@ -1,7 +1,8 @@
 //! Checks that nobody drives through anything, that there is something to see, and that it moves.
 
-use super::{Place, VEHICLE, draw};
+use super::{Place, draw};
 use crate::collisions::check_clear;
+use crate::dimensions::VEHICLE;
 use crate::path::Path;
 use crate::scene::Scene;
 use glam::DVec3;

@@ -40,11 +40,8 @@ impl Yard<'_> {
                 0 | 1 => self.guard_rail([at, end], 0.0),
                 2 => self.along([at, end], |yard, x, long| yard.hedge(x, 0.0, long)),
                 3 => {
-                    let size = [0.4, self.rng.range(0.6, 1.1)];
-                    self.along([at, end], |yard, x, long| {
-                        let size = [long, size[0], size[1]];
-                        yard.cuboid(Class::Fixture, [x, 0.0], size, 0.0, Surface::matt(0.45));
-                    });
+                    let height = self.rng.range(0.6, 1.1);
+                    self.wall([at, end], 0.0, [0.4, height], Surface::matt(0.45));
                 }
                 _ => {}
             }
@@ -82,8 +79,13 @@ impl Yard<'_> {
     fn noise_wall(&mut self, stretch: [f64; 2], y: f64) {
         let size = [self.rng.range(0.12, 0.3), self.rng.range(2.0, 5.0)];
         let panels = Surface::matt(self.rng.range(0.25, 0.6));
+        self.wall(stretch, y, size, panels);
+    }
+
+    /// A wall of this thickness and height.
+    fn wall(&mut self, stretch: [f64; 2], y: f64, [thick, tall]: [f64; 2], surface: Surface) {
         self.along(stretch, |yard, x, long| {
-            yard.cuboid(Class::Fixture, [x, y], [long, size[0], size[1]], 0.0, panels);
+            yard.cuboid(Class::Fixture, [x, y], [long, thick, tall], 0.0, surface);
         });
     }
 

@@ -1,7 +1,7 @@
 //! Houses: in closed rows, behind gardens, along the crossing road.
 
 use super::Yard;
-use crate::dimensions::CROSS_HALF;
+use crate::dimensions::{CROSS_HALF, Section};
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {
@@ -74,8 +74,8 @@ impl Yard<'_> {
 
     pub(super) fn houses_along_crossing(&mut self, y: [f64; 2], side: f64) {
         for (sign, end) in [(-1.0, -y[0]), (1.0, y[1])] {
-            // Behind the houses along the main road.
-            let mut at = f64::max(27.0, self.edge() + 17.0);
+            // Behind closed rows of houses along the main road.
+            let mut at = self.edge().max(Section::WIDE.edge()) + 17.0;
             while at < end {
                 let length = self.rng.range(8.0, 22.0);
                 let front = CROSS_HALF + 3.0 + self.rng.range(0.0, 3.0);

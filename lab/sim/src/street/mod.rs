@@ -54,9 +54,10 @@ pub(crate) struct Background {
 pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Background {
     let mut yard = Yard::new(ground, crossing, rng);
     let section = ground.section();
-    let (wide, broad) = (section == Section::WIDE, section.lanes > 1);
+    let (plain, broad) = (section == Section::WIDE, section.lanes > 1);
+    let narrow = !plain && !broad;
     for side in [-1.0, 1.0] {
-        if wide {
+        if plain {
             yard.blocks(extent.x, side)
         } else if broad {
             yard.roadside(extent.x, side)
@@ -64,11 +65,11 @@ pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rn
             yard.plots(extent.x, side)
         }
         yard.houses_along_crossing(extent.y, side);
-        if wide || broad {
+        if !narrow {
             yard.kerb_side(extent.x, side);
         }
     }
-    if wide || broad {
+    if !narrow {
         yard.signals();
     }
     if section.median_half > 0.0 {

@@ -4,7 +4,7 @@
 mod footprint;
 mod routes;
 
-use crate::dimensions::{CROSS_HALF, Section};
+use crate::dimensions::{CROSS_HALF, Section, VEHICLE};
 use crate::ego::{Pace, Plan};
 use crate::models;
 use crate::object::Object;
@@ -39,7 +39,7 @@ pub(crate) fn fill(
     density: f64,
     rng: &mut Rng,
 ) -> Vec<Object> {
-    let mut taken = vec![Footprint::new(&plan.path, 4.6, 1.9, duration_s)];
+    let mut taken = vec![Footprint::new(&plan.path, VEHICLE[0], VEHICLE[1], duration_s)];
     taken.extend(street.fixtures.iter().filter_map(obstacle));
     let mut fill = Fill { objects: Vec::new(), plan, duration_s, taken, rng };
     fill.park(extent.x, density);
@@ -141,8 +141,7 @@ impl Fill<'_> {
     /// A slow vehicle and a car that passes it; in one case in three the slow one is the vehicle
     /// that carries the sensors, if that is in the outer lane.
     fn overtaking(&mut self) {
-        let outer = -self.plan.section.outer_lane();
-        let is_outer = (self.plan.path.at(0.0).y - outer).abs() < 0.1;
+        let is_outer = self.plan.lane == self.plan.section.outer_lane();
         let slow = if self.rng.chance(0.33) && is_outer {
             Some(self.plan.path.clone())
         } else {
