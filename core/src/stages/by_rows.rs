@@ -5,7 +5,7 @@
 
 use super::background_filter::mark_by_bytes;
 use super::flow::expectation_by_rings::expectation_by_rings;
-use super::occupancy_constancy::occupancy_constancy_by_bytes;
+use super::occupancy_constancy::occupancy_constancy_by_lines;
 use super::window::window;
 use super::{FOREGROUND_COUNT, Storage};
 use crate::params::ROW;
@@ -29,22 +29,22 @@ pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, weights, costs) = (&s.sweep, &*s.constancy_weights, &*s.constancy_costs);
     let (foreground, before, now) = (&*s.foreground, &*s.columns_before, &*s.columns_now);
+    let simd = workers.simd();
     share(
         workers,
         PIECE_ROWS_MAX,
         0..count,
         &mut s.pair_cost[..count * ROW],
         ROW,
-        &|rows, costs_of_rows| {
+        &move |rows, pairs| {
             let foreground = &foreground[rows];
-            occupancy_constancy_by_bytes(
-                sweep,
-                weights,
-                costs,
-                foreground,
-                before,
-                now,
-                costs_of_rows,
+            simd.run(
+                #[inline(always)]
+                move || {
+                    occupancy_constancy_by_lines(
+                        sweep, weights, costs, foreground, before, now, pairs,
+                    );
+                },
             );
         },
     );

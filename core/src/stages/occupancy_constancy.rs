@@ -9,10 +9,10 @@
 //! the sum of nine fits in 16 bits, `atomicMin` finds the winners, and the largest number can
 //! represent "none yet" ([`NONE`](crate::record::NONE)).
 
-use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW, SIDE};
+use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW, SIDE, SIDE_MAX};
 use crate::record::{Column, SweepUniform};
-use crate::stages::background_filter::fill_byte_table;
 use crate::weights::{Weights, WeightsError};
+use core::ops::Range;
 
 /// Maximum entries of the table of log-sigmoids: sums of weights, bias included.
 pub const SCORES_MAX: usize = 8192;
@@ -124,8 +124,83 @@ pub fn occupancy_constancy(
     }
 }
 
-/// [`occupancy_constancy`] for the scalar backend: four byte lookups score a pair.
-pub fn occupancy_constancy_by_bytes(
+/// Lines of the grid that a source's targets lie on.
+const LINES: usize = SIDE.next_power_of_two();
+/// Columns of such a line: those outside the grid on either side are unknown.
+const WIDTH: usize = SIDE_MAX + LINE;
+
+/// Free and occupied levels of the columns of consecutive lines, one bit each: targets next to each
+/// other lie next to each other in memory.
+struct TargetLines {
+    /// Line `n` of the grid is at `n % LINES`, its column `j` at `j + REACH`.
+    masks: [[[u16; WIDTH]; 2]; LINES],
+    held: Range<i32>,
+}
+
+impl TargetLines {
+    const NONE: TargetLines = TargetLines { masks: [[[0; WIDTH]; 2]; LINES], held: 0..0 };
+
+    /// Holds these lines, at most [`LINES`]; those outside the grid are unknown.
+    #[inline(always)]
+    fn hold(&mut self, lines: Range<i32>, side: i32, columns: &[Column]) {
+        let known = self.held.contains(&lines.start);
+        let from = if known { self.held.end } else { lines.start };
+        for line in from..lines.end {
+            let [free, occupied] = &mut self.masks[line as usize % LINES];
+            if !(0..side).contains(&line) {
+                free.fill(0);
+                occupied.fill(0);
+                continue;
+            }
+            let columns = &columns[(line * side) as usize..][..side as usize];
+            let held = free[REACH as usize..].iter_mut().zip(&mut occupied[REACH as usize..]);
+            for ((free, occupied), [masks, _]) in held.zip(columns) {
+                (*free, *occupied) = (*masks as u16, (masks >> 16) as u16);
+            }
+        }
+        self.held = lines;
+    }
+
+    /// Masks of the columns of a line from this one less [`REACH`] on.
+    #[inline(always)]
+    fn around(&self, line: i32, column: i32) -> [&[u16; LINE]; 2] {
+        let masks = &self.masks[line as usize % LINES];
+        masks.each_ref().map(|m| m[column as usize..].first_chunk().expect("a margin"))
+    }
+}
+
+/// A level that a source knows: its bit, and what a free and an occupied target add to the score.
+type KnownLevel = (u16, [i16; 2]);
+
+/// The levels that a source knows.
+#[inline(always)]
+fn known_levels(source: Column, weights: &[i32]) -> heapless::Vec<KnownLevel, LEVELS_MAX> {
+    let bits = bit_weights(source, weights);
+    let known = (source[0] | source[0] >> 16) as u16;
+    let levels = (0..LEVELS_MAX).filter(|k| known >> k & 1 != 0);
+    // They fit: no sum of them spans more than `SCORES_MAX`.
+    levels.map(|k| (1 << k, [bits[k], bits[16 + k]].map(|weight| weight as i16))).collect()
+}
+
+/// Scores of the targets with these masks, all at once: `none` is that of an unknown one.
+#[inline(always)]
+fn line_scores(levels: &[KnownLevel], masks: [&[u16; LINE]; 2], none: i16) -> [i16; LINE] {
+    let [free, occupied] = masks.map(|masks| *masks);
+    let mut scores = [none; LINE];
+    for &(bit, [of_free, of_occupied]) in levels {
+        for n in 0..LINE {
+            let if_free = if free[n] & bit != 0 { of_free } else { 0 };
+            let if_occupied = if occupied[n] & bit != 0 { of_occupied } else { 0 };
+            scores[n] = scores[n].wrapping_add(if_free).wrapping_add(if_occupied);
+        }
+    }
+    scores
+}
+
+/// [`occupancy_constancy`] for the scalar backend: the targets of a line are scored at once, by the
+/// levels that the source knows.
+#[inline(always)]
+pub fn occupancy_constancy_by_lines(
     sweep: &SweepUniform,
     constancy_weights: &[i32],
     constancy_costs: &[u32],
@@ -135,28 +210,19 @@ pub fn occupancy_constancy_by_bytes(
     pair_cost: &mut [u16],
 ) {
     let side = sweep.side;
-    let offset = constancy_weights[3 * LEVELS_MAX] - sweep.score_min;
-    let unknown = constancy_costs[offset as usize] as u16;
-    let mut bytes = [[0; 256]; 4];
-    for (&source, row) in foreground.iter().zip(pair_cost.chunks_exact_mut(ROW)) {
-        let bits = bit_weights(columns_before[source as usize], constancy_weights);
-        for (bits, bytes) in bits.chunks_exact(8).zip(&mut bytes) {
-            fill_byte_table(bits, bytes);
-        }
+    let unknown = (constancy_weights[3 * LEVELS_MAX] - sweep.score_min) as i16;
+    let costs: &[u32; SCORES_MAX] = constancy_costs.first_chunk().expect("a cost of every score");
+    let cost_of = |score: i16| costs[score as u16 as usize % SCORES_MAX] as u16;
+    let mut targets = TargetLines::NONE;
+    for (&source, row) in foreground.iter().zip(pair_cost.as_chunks_mut::<ROW>().0) {
+        let levels = known_levels(columns_before[source as usize], constancy_weights);
         let (i, j) = (source as i32 / side, source as i32 % side);
-        for (du, row) in (-REACH..).zip(row.chunks_exact_mut(LINE)) {
-            row.fill(unknown);
-            if !(0..side).contains(&(i + du)) {
-                continue;
-            }
-            let (from, to) = ((j - REACH).max(0), (j + REACH).min(side - 1));
-            let line = (i + du) * side;
-            let targets = &columns_now[(line + from) as usize..=(line + to) as usize];
-            for (target, cost) in targets.iter().zip(&mut row[(from - j + REACH) as usize..]) {
-                let [a, b, c, d] = target[0].to_le_bytes().map(usize::from);
-                let score = bytes[0][a] + bytes[1][b] + bytes[2][c] + bytes[3][d];
-                *cost = constancy_costs[(score + offset) as usize] as u16;
-            }
+        let lines = i - REACH..i + REACH + 1;
+        targets.hold(lines.clone(), side, columns_now);
+        for (line, row) in lines.zip(row.as_chunks_mut::<LINE>().0) {
+            let scores = line_scores(&levels, targets.around(line, j), unknown);
+            row.iter_mut().zip(scores).for_each(|(cost, score)| *cost = cost_of(score));
+            row[SIDE..].fill(cost_of(unknown));
         }
     }
 }
@@ -210,7 +276,7 @@ mod tests {
         occupancy_constancy(&sweep, &weights, &costs, &foreground, &before, &now, &mut cost);
         let mut fast = vec![0; 4 * ROW];
         let (w, c) = (&weights, &costs);
-        occupancy_constancy_by_bytes(&sweep, w, c, &foreground, &before, &now, &mut fast);
+        occupancy_constancy_by_lines(&sweep, w, c, &foreground, &before, &now, &mut fast);
         assert!(fast == cost);
         for (n, source) in foreground.iter().enumerate() {
             let (i, j) = (*source as i32 / 33, *source as i32 % 33);

@@ -11,7 +11,7 @@ use raywake_core::prepare::uniform_of;
 use raywake_core::record::{Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement};
 use raywake_core::stages::background_filter::background_filter_by_bytes;
 use raywake_core::stages::flow::{expectation_by_rings::propose, maximisation::maximisation};
-use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_bytes;
+use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_lines;
 use raywake_core::stages::window::{Costs, WindowCosts, least};
 
 /// Rounds of either minimisation (n_em, sections 3.8.1 and 4.5).
@@ -105,7 +105,7 @@ impl Constancy {
         let [before, now] = &pair.columns;
         let (weights, costs) = (&self.tables.constancy, &self.tables.costs);
         let pairs = alone.as_flattened_mut();
-        occupancy_constancy_by_bytes(&self.step, weights, costs, foreground, before, now, pairs);
+        occupancy_constancy_by_lines(&self.step, weights, costs, foreground, before, now, pairs);
         let mut around = vec![[0; ROW]; foreground.len()];
         for (row, cell) in around.iter_mut().zip(foreground) {
             WindowCosts::of(&self.step, &rank, pairs, *cell).fill_row(row);

@@ -6,7 +6,7 @@ use raywake_core::params::{FOREGROUND_MAX, LINE, REACH, ROW, TILE};
 use raywake_core::record::{NONE, SweepUniform};
 use raywake_core::stages::COUNTERS;
 use raywake_core::stages::compact::compact;
-use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_bytes;
+use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_lines;
 use raywake_core::stages::prefix_sum::prefix_sum;
 use raywake_core::stages::window::{Costs, WindowCosts};
 use serde::Serialize;
@@ -65,7 +65,7 @@ impl Ranker {
         let solid = &self.list[..count];
         let (weights, costs) = (&tables.constancy, &tables.costs);
         let cost = &mut self.cost[..count * ROW];
-        occupancy_constancy_by_bytes(&step, weights, costs, solid, &pair.before, &pair.now, cost);
+        occupancy_constancy_by_lines(&step, weights, costs, solid, &pair.before, &pair.now, cost);
         let mut row = [0; ROW];
         for m in pair.matches.iter().filter(|m| self.rank[m.source] != NONE) {
             WindowCosts::of(&step, &self.rank, cost, m.source as u32).fill_row(&mut row);
