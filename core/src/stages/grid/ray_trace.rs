@@ -2,13 +2,14 @@
 
 use super::ray_merge::merged;
 use super::walk::Walk;
-use crate::params::{LOG_ODDS_FREE, LOG_ODDS_OCCUPIED};
+use crate::params::{EXTENT_VOXELS, LOG_ODDS_FREE, LOG_ODDS_OCCUPIED, SIDE_MAX};
 use crate::record::{NO_END, Ray, SweepUniform, ray_end, ray_origin};
 
 /// Adds the updates of every entry of `distinct` to `log_odds` (tenths, one per voxel): each voxel
 /// passed inside the window gets the free update, the end the occupied one. A ray that leaves the
 /// window, goes beyond `range_steps` or carries `no_end` leaves only free space. The sums are
 /// integers, so the order of the rays does not matter.
+#[inline(always)]
 pub fn ray_trace(
     sweep: &SweepUniform,
     origins: &[[i32; 4]],
@@ -32,10 +33,18 @@ pub fn ray_trace(
 
 /// Number of rays looked up at once.
 const BATCH: usize = 64;
+/// Number of steps of a walk computed at once.
+const LANES: usize = 8;
+/// Bits of the part of a voxel that a walk has gone along an axis: as many as leave room for the
+/// voxels of [`LANES`] steps. They decide exactly where a voxel ends: those places are at least
+/// 1 / (2 length) of a voxel apart, and rounding adds up to less than that in a walk of fewer than
+/// 2^(PART_BITS - 1) / length steps.
+const PART_BITS: u32 = u32::BITS - LANES.ilog2() - 1;
+const _: () = assert!(SIDE_MAX as i64 * 4 * (EXTENT_VOXELS as i64) < 1 << (PART_BITS - 1));
 
 /// Adds the updates of a ray that counts `weight` times: those of [`Walk`], clipped to the window
 /// first and then walked by index.
-#[inline]
+#[inline(always)]
 fn trace(sweep: &SweepUniform, start: [i32; 3], ray: Ray, weight: i32, log_odds: &mut [i32]) {
     let end = ray_end(ray);
     let line = WalkInWindow::new(sweep, start, end);
@@ -103,37 +112,47 @@ impl WalkInWindow {
         (from, to)
     }
 
-    /// Visits the voxels before these steps by index. Only the loop's branch depends on the ray.
-    #[inline]
+    /// Visits the voxels before these steps by index, those of [`LANES`] steps computed at once.
+    #[inline(always)]
     fn walk(&self, from: i64, to: i64, start: [i32; 3], mut visit: impl FnMut(usize)) {
         if from >= to {
             return;
         }
-        let longest = (0..3).rev().find(|a| self.extent[*a] == self.length).unwrap_or(0);
+        let (extent, length) = (self.extent, self.length);
         let gone = match from {
             0 => [0; 3],
-            _ => self.extent.map(|extent| (2 * extent * from + self.length) / (2 * self.length)),
+            _ => extent.map(|extent| (2 * extent * from + length) / (2 * length)),
         };
-        let at = |axis: usize| start[axis] + self.step[axis] * gone[axis] as i32;
-        let mut index = (0..3).map(|axis| at(axis) * self.stride[axis]).sum::<i32>();
         let by = |axis: usize| self.step[axis] * self.stride[axis];
-        // The others step when their error says so.
+        let at = |axis: usize| start[axis] * self.stride[axis] + gone[axis] as i32 * by(axis);
+        let mut first = (0..3).map(at).sum::<i32>();
+        let longest = (0..3).rev().find(|a| extent[*a] == length).unwrap_or(0);
         let others = [(longest + 1) % 3, (longest + 2) % 3];
-        let rise = others.map(|axis| 2 * self.extent[axis] as i32);
-        let mut error = others.map(|axis| {
-            let error = 2 * self.extent[axis] * (from + 1) - self.length;
-            (error - 2 * self.length * gone[axis]) as i32
+        // Rounded up, so that what is exactly at a voxel's edge is beyond it.
+        let mut part = others.map(|axis| {
+            let of_voxel = 2 * extent[axis] * from + length - 2 * length * gone[axis];
+            ((of_voxel << PART_BITS) as u64).div_ceil(2 * length as u64) as u32
         });
-        let (always, sometimes, fall) = (by(longest), others.map(by), 2 * self.length as i32);
-        for _ in from..to {
-            visit(index as usize);
-            index += always;
-            for n in 0..2 {
-                // All ones if the error is not negative.
-                let steps = !(error[n] >> 31);
-                index += sometimes[n] & steps;
-                error[n] += rise[n] - (fall & steps);
+        let rise = others.map(|axis| ((extent[axis] << PART_BITS) as u64).div_ceil(length as u64));
+        let rise = rise.map(|rise| rise as u32);
+        let (always, [one, other]) = (by(longest), others.map(by));
+        let after = |n: u32, part: [u32; 2]| {
+            let [a, b] = [0, 1].map(|axis| (part[axis] + n * rise[axis]) >> PART_BITS);
+            n as i32 * always + a as i32 * one + b as i32 * other
+        };
+        let mut left = (to - from) as usize;
+        loop {
+            let mut voxels = [0; LANES];
+            for (n, voxel) in voxels.iter_mut().enumerate() {
+                *voxel = (first + after(n as u32, part)) as u32;
             }
+            if left < LANES {
+                return voxels[..left].iter().for_each(|voxel| visit(*voxel as usize));
+            }
+            voxels.iter().for_each(|voxel| visit(*voxel as usize));
+            left -= LANES;
+            first += after(LANES as u32, part);
+            part = [0, 1].map(|n| (part[n] + LANES as u32 * rise[n]) % (1 << PART_BITS));
         }
     }
 }
