@@ -10,7 +10,7 @@ use crate::frame::{Window, central};
 use crate::params::{ORIGINS_MAX, Profile, SENSORS_MAX, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
-use crate::return_clock::{ReturnClock, slot_of};
+use crate::return_clock::ReturnClock;
 use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
 use crate::team::{self, Team};
@@ -218,29 +218,27 @@ impl<'a> Caster<'a> {
 
     /// Casts the rays of some returns, and stores their columns and positions.
     fn cast_all<'p>(&self, points: impl Iterator<Item = &'p Point>, out: &mut CastReturns) {
-        let mut batch = ReturnBatch::new();
         let count = out.columns.len();
-        for (n, point) in points.take(count).enumerate() {
-            let Some(own) = out.dropped.admit(self.rig, point) else {
-                out.leave_out(n);
-                continue;
-            };
-            let when = self.clock.slots(self.rig, point);
-            let slot = if self.moving { slot_of(when) } else { 0 };
-            if batch.push(n, point, own, when, slot) {
+        self.simd.run(
+            #[inline(always)]
+            || {
+                let mut batch = ReturnBatch::new();
+                for (n, point) in points.take(count).enumerate() {
+                    match out.dropped.admit(self.rig, point) {
+                        None => out.leave_out(n),
+                        Some(own) if batch.push(n, point, own) => self.cast(&mut batch, out),
+                        Some(_) => {}
+                    }
+                }
                 self.cast(&mut batch, out);
-            }
-        }
-        self.cast(&mut batch, out);
+            },
+        );
     }
 
     /// Casts the rays of a batch and empties it.
+    #[inline(always)]
     fn cast(&self, batch: &mut ReturnBatch, out: &mut CastReturns) {
-        let lattice = &self.lattice;
-        let found = self.simd.run(
-            #[inline(always)]
-            || lattice.place(batch),
-        );
+        let found = self.place(batch);
         for l in 0..core::mem::take(&mut batch.len) {
             let (n, own) = (batch.index[l], batch.own[l]);
             if found.far[l] {
@@ -250,7 +248,7 @@ impl<'a> Caster<'a> {
             }
             out.dropped.own_vehicle += u64::from(own);
             let end = [found.end[0][l], found.end[1][l], found.end[2][l]];
-            let origin = self.origin_ids[batch.sensor[l]][batch.slot[l]];
+            let origin = self.origin_ids[batch.sensor[l]][found.slot[l] as usize];
             out.rays[out.count] = ray(end, origin, own);
             out.count += 1;
             if own {
@@ -260,7 +258,7 @@ impl<'a> Caster<'a> {
             out.columns[n] = found.column[l];
             if let Some(placed) = out.placed.get_mut(n) {
                 let at = [found.at[0][l], found.at[1][l], found.at[2][l]];
-                *placed = Placed { at, offset_s: self.from_s + batch.when[l] * self.slot_s };
+                *placed = Placed { at, offset_s: self.from_s + found.when[l] * self.slot_s };
             }
         }
     }

@@ -91,17 +91,20 @@ record! {
 pub const NO_END: u32 = 1 << 31;
 
 /// Packs a ray.
+#[inline]
 pub fn ray(end: [i32; 3], origin: u32, no_end: bool) -> Ray {
     let [i, j, k] = end.map(|v| v as u32 & 0xffff);
     [i | j << 16, k | origin << 16 | (no_end as u32) << 31]
 }
 
 /// End voxel of a ray.
+#[inline]
 pub fn ray_end(r: Ray) -> [i32; 3] {
     [r[0] as i16 as i32, (r[0] >> 16) as i16 as i32, r[1] as i16 as i32]
 }
 
 /// Origin index of a ray.
+#[inline]
 pub fn ray_origin(r: Ray) -> usize {
     (r[1] >> 16 & 0x7fff) as usize
 }
@@ -110,12 +113,14 @@ pub fn ray_origin(r: Ray) -> usize {
 pub const VALID: u32 = 1 << 31;
 
 /// Packs a valid displacement, cells.
+#[inline]
 pub fn pack_flow(d: [i32; 2]) -> Flow {
     let reach = crate::params::REACH;
     VALID | ((d[0] + reach) as u32) << 8 | (d[1] + reach) as u32
 }
 
 /// The displacement of a valid flow, cells.
+#[inline]
 pub fn flow_displacement(f: Flow) -> [i32; 2] {
     let reach = crate::params::REACH;
     [(f >> 8 & 0xff) as i32 - reach, (f & 0xff) as i32 - reach]

@@ -6,6 +6,7 @@
 use crate::params::SLOTS;
 use crate::pose::Pose;
 use crate::sweep::{Point, Rig, Sweep, Timing};
+use raywake_simd::integer_part;
 
 /// Entries of the table from azimuth to time.
 const AZIMUTHS: usize = 1024;
@@ -38,22 +39,44 @@ impl ReturnClock {
     }
 
     /// Time of a return, slots from the beginning of its sweep.
-    #[inline]
     pub fn slots(&self, rig: &Rig, point: &Point) -> f32 {
-        match rig.timing {
-            Timing::AtStamp => 0.0,
+        let [x, y, _] = point.position.map(|v| [v]);
+        let [slots] = self.slots_of(rig.timing, [&x, &y], &[point.offset_s]);
+        slots
+    }
+
+    /// The same for several at once, from their positions and offsets.
+    #[inline(always)]
+    pub(crate) fn slots_of<const N: usize>(
+        &self,
+        timing: Timing,
+        [x, y]: [&[f32; N]; 2],
+        offset_s: &[f32; N],
+    ) -> [f32; N] {
+        let mut slots = [0.0; N];
+        match timing {
+            Timing::AtStamp => {}
             Timing::Offset { from_s, span_s } => {
-                let slots = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
-                if slots > 0.0 { slots.min(SLOTS as f32) } else { 0.0 }
+                let (from_s, per_s) = (from_s as f32, SLOTS as f32 / span_s as f32);
+                for (slots, offset_s) in slots.iter_mut().zip(offset_s) {
+                    let since = (offset_s - from_s) * per_s;
+                    *slots = if since > 0.0 { since.min(SLOTS as f32) } else { 0.0 };
+                }
             }
             Timing::Azimuth { .. } => {
-                let p = pseudo_angle(point.position[0], point.position[1]);
-                let p = p * (AZIMUTHS as f32 / TURN);
-                let n = (p as i32 as usize).min(AZIMUTHS - 1);
-                let (low, high) = (self.slot_of_azimuth[n], self.slot_of_azimuth[n + 1]);
-                low + (p - n as f32) * (high - low)
+                let (mut angle, mut entry) = ([0.0; N], [0; N]);
+                for n in 0..N {
+                    angle[n] = pseudo_angle(x[n], y[n]) * (AZIMUTHS as f32 / TURN);
+                    entry[n] = integer_part(angle[n]).clamp(0, AZIMUTHS as i32 - 1);
+                }
+                let slot_of = |entry: i32| self.slot_of_azimuth[entry as usize];
+                let (low, high) = (entry.map(slot_of), entry.map(|entry| slot_of(entry + 1)));
+                for n in 0..N {
+                    slots[n] = low[n] + (angle[n] - entry[n] as f32) * (high[n] - low[n]);
+                }
             }
         }
+        slots
     }
 
     /// Time of a return after the sweep's stamp, s.
@@ -64,9 +87,9 @@ impl ReturnClock {
 }
 
 /// The slot that contains a time in slots.
-#[inline]
+#[inline(always)]
 pub fn slot_of(slots: f32) -> usize {
-    (slots as i32 as usize).min(SLOTS - 1)
+    integer_part(slots).clamp(0, SLOTS as i32 - 1) as usize
 }
 
 impl Timing {
@@ -99,12 +122,11 @@ pub(crate) const TURN: f32 = 4.0;
 
 /// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at
 /// the rear, 1 to the left, 2 in front, 3 to the right.
-#[inline]
+#[inline(always)]
 pub(crate) fn pseudo_angle(x: f32, y: f32) -> f32 {
+    // Without a branch: several are computed at once.
     let sum = x.abs() + y.abs();
-    if sum == 0.0 {
-        return 2.0;
-    }
     let c = x / sum;
-    if y >= 0.0 { 1.0 + c } else { 3.0 - c }
+    let angle = if y >= 0.0 { 1.0 + c } else { 3.0 - c };
+    if sum == 0.0 { 2.0 } else { angle }
 }

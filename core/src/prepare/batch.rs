@@ -1,40 +1,44 @@
 //! Placing several returns in the window at once.
 
-use super::{Drift, FAR, ToVoxel};
+use super::{Caster, Drift, FAR, ToVoxel};
 use crate::params::{EXTENT_VOXELS, SLOTS};
 use crate::record::NONE;
+use crate::return_clock::slot_of;
 use crate::sweep::Point;
-use core::array::from_fn;
+use raywake_simd::integer_part;
 
-/// Number of returns placed together.
-pub(super) const LANES: usize = 8;
+/// Number of returns placed together. Loops as long as this are vectorised; and a processor waits
+/// for numbers that it reads together right after they were written one by one.
+pub(super) const BATCH: usize = 64;
 
 /// Returns waiting to be placed.
 pub(super) struct ReturnBatch {
     pub len: usize,
     /// Position of each in the vehicle frame, by axis, m.
-    position: [[f32; LANES]; 3],
-    /// Time of each, slots from the beginning of the sweep.
-    pub when: [f32; LANES],
-    /// The slot whose motion is applied to it.
-    pub slot: [usize; LANES],
-    pub sensor: [usize; LANES],
+    position: [[f32; BATCH]; 3],
+    /// Time of each after the stamp, s.
+    offset_s: [f32; BATCH],
+    pub sensor: [usize; BATCH],
     /// Whether it lies on the ego vehicle.
-    pub own: [bool; LANES],
+    pub own: [bool; BATCH],
     /// Its index in the sweep.
-    pub index: [usize; LANES],
+    pub index: [usize; BATCH],
 }
 
-/// Positions of the returns of a batch.
+/// Where and when the returns of a batch were measured. Entries beyond its length are meaningless.
 pub(super) struct PlacedBatch {
+    /// Time of each, slots from the beginning of the sweep.
+    pub when: [f32; BATCH],
+    /// The slot whose motion is applied to it.
+    pub slot: [i32; BATCH],
     /// Voxel of each, by axis.
-    pub end: [[i32; LANES]; 3],
+    pub end: [[i32; BATCH]; 3],
     /// Whether that is farther than rays can reach.
-    pub far: [bool; LANES],
+    pub far: [bool; BATCH],
     /// Column of each, or [`NONE`].
-    pub column: [u32; LANES],
+    pub column: [u32; BATCH],
     /// Position of each, by axis, voxels, at its own time.
-    pub at: [[f32; LANES]; 3],
+    pub at: [[f32; BATCH]; 3],
 }
 
 /// The window in which returns are placed.
@@ -52,64 +56,83 @@ impl ReturnBatch {
     pub const fn new() -> ReturnBatch {
         ReturnBatch {
             len: 0,
-            position: [[0.0; LANES]; 3],
-            when: [0.0; LANES],
-            slot: [0; LANES],
-            sensor: [0; LANES],
-            own: [false; LANES],
-            index: [0; LANES],
+            position: [[0.0; BATCH]; 3],
+            offset_s: [0.0; BATCH],
+            sensor: [0; BATCH],
+            own: [false; BATCH],
+            index: [0; BATCH],
         }
     }
 
     /// Adds a return to a batch that is not full. Returns whether it is full now.
-    #[inline]
-    pub fn push(&mut self, index: usize, point: &Point, own: bool, when: f32, slot: usize) -> bool {
+    #[inline(always)]
+    pub fn push(&mut self, index: usize, point: &Point, own: bool) -> bool {
         let n = self.len;
         for (axis, position) in self.position.iter_mut().zip(point.position) {
             axis[n] = position;
         }
-        (self.when[n], self.slot[n], self.sensor[n]) = (when, slot, point.sensor as usize);
+        (self.offset_s[n], self.sensor[n]) = (point.offset_s, point.sensor as usize);
         (self.own[n], self.index[n]) = (own, index);
         self.len += 1;
-        self.len == LANES
+        self.len == BATCH
+    }
+}
+
+impl Caster<'_> {
+    /// Places a batch.
+    #[inline(always)]
+    pub fn place(&self, batch: &ReturnBatch) -> PlacedBatch {
+        let [x, y, _] = &batch.position;
+        let mut placed = PlacedBatch {
+            when: self.clock.slots_of(self.rig.timing, [x, y], &batch.offset_s),
+            slot: [0; BATCH],
+            end: [[0; BATCH]; 3],
+            far: [false; BATCH],
+            column: [NONE; BATCH],
+            at: [[0.0; BATCH]; 3],
+        };
+        if self.moving {
+            for (slot, when) in placed.slot.iter_mut().zip(placed.when) {
+                *slot = slot_of(when) as i32;
+            }
+        }
+        self.lattice.place(batch, &mut placed);
+        placed
     }
 }
 
 impl RayLattice {
-    /// Places a batch. Entries beyond its length are meaningless.
+    /// Places a batch whose times are known.
     #[inline(always)]
-    pub fn place(&self, batch: &ReturnBatch) -> PlacedBatch {
-        let mut out = PlacedBatch {
-            end: [[0; LANES]; 3],
-            far: [false; LANES],
-            column: [NONE; LANES],
-            at: [[0.0; LANES]; 3],
-        };
-        let [x, y, z] = &batch.position;
-        for axis in 0..3 {
-            let row: [[f32; 4]; LANES] = from_fn(|l| self.to_voxel[batch.slot[l]][axis]);
-            let centre = self.centre[axis];
-            for l in 0..LANES {
-                let [rx, ry, rz, shift] = row[l];
-                let v = (rx * x[l] + ry * y[l] + rz * z[l] + shift).clamp(-FAR, FAR);
-                let cut = v as i32;
+    fn place(&self, batch: &ReturnBatch, out: &mut PlacedBatch) {
+        let mut from = 0;
+        // Returns come in the order of time: most of a batch share a few slots.
+        for same in out.slot.chunk_by(|a, b| a == b) {
+            let (to_voxel, to) = (&self.to_voxel[same[0] as usize], from + same.len());
+            let [x, y, z] = batch.position.each_ref().map(|axis| &axis[from..to]);
+            for ([rx, ry, rz, shift], at) in to_voxel.iter().zip(&mut out.at) {
+                for (((at, x), y), z) in at[from..to].iter_mut().zip(x).zip(y).zip(z) {
+                    *at = (rx * x + ry * y + rz * z + shift).clamp(-FAR, FAR);
+                }
+            }
+            from = to;
+        }
+        for ((at, end), centre) in out.at.iter_mut().zip(&mut out.end).zip(self.centre) {
+            for ((at, end), far) in at.iter_mut().zip(end).zip(&mut out.far) {
+                let cut = integer_part(*at);
                 // Truncation rounds up below zero.
-                let end = cut - i32::from((cut as f32) > v) + centre;
-                out.end[axis][l] = end;
-                out.far[l] |= end.abs() > EXTENT_VOXELS;
-                out.at[axis][l] = v + centre as f32;
+                *end = cut - i32::from((cut as f32) > *at) + centre;
+                *far |= end.abs() > EXTENT_VOXELS;
+                *at += centre as f32;
             }
         }
-        for l in 0..LANES {
-            let [i, j, k] = out.end.map(|end| end[l] as u32);
+        let ([i, j, k], [x, y, z]) = (&out.end, &mut out.at);
+        for n in 0..BATCH {
+            let [i, j, k] = [i[n] as u32, j[n] as u32, k[n] as u32];
             let inside = (i < self.side) & (j < self.side) & (k < self.levels);
-            out.column[l] = if inside { i.wrapping_mul(self.side).wrapping_add(j) } else { NONE };
-            let after = batch.when[l] - (batch.slot[l] as f32 + 0.5);
-            let at = self.drift.place([out.at[0][l], out.at[1][l], out.at[2][l]], after);
-            for (axis, at) in out.at.iter_mut().zip(at) {
-                axis[l] = at;
-            }
+            out.column[n] = if inside { i.wrapping_mul(self.side).wrapping_add(j) } else { NONE };
+            let after = out.when[n] - (out.slot[n] as f32 + 0.5);
+            [x[n], y[n], z[n]] = self.drift.place([x[n], y[n], z[n]], after);
         }
-        out
     }
 }

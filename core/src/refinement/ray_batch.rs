@@ -4,6 +4,7 @@ use crate::return_clock::{TURN, pseudo_angle};
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use core::array::from_fn;
+use raywake_simd::integer_part;
 
 /// Number of directions in the plane that are distinguished, by [`pseudo_angle`]: each 0.2 to 0.5
 /// degrees wide.
@@ -69,7 +70,7 @@ impl RayBatch {
             scale[l] = STEPS * (FAR / farthest).min(1.0);
             azimuths[l] = azimuth([x[l], y[l]]);
         }
-        let whole = |v: [f32; LANES]| -> [i32; LANES] { from_fn(|l| (v[l] * scale[l]) as i32) };
+        let whole = |v: [f32; LANES]| -> [i32; LANES] { from_fn(|l| integer_part(v[l] * scale[l])) };
         let end = [x, y, z].map(whole);
         let mut slopes = [0.0; LANES];
         for l in 0..LANES {
@@ -82,7 +83,7 @@ impl RayBatch {
 /// The direction of a ray in the plane, as an index.
 #[inline(always)]
 pub fn azimuth([x, y]: [f32; 2]) -> u16 {
-    let azimuth = (pseudo_angle(x, y) * (AZIMUTHS as f32 / TURN)) as i32;
+    let azimuth = integer_part(pseudo_angle(x, y) * (AZIMUTHS as f32 / TURN));
     azimuth.min(AZIMUTHS as i32 - 1) as u16
 }
 

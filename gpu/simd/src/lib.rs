@@ -80,10 +80,33 @@ impl Simd {
     }
 }
 
+/// The integer part of a number; beyond 2^30 on either side that bound, for NaN the lower one.
+///
+/// Compilers do this for several numbers at once, which they do not for `as`: that has more to
+/// check, a number at a time.
+#[inline(always)]
+pub fn integer_part(number: f32) -> i32 {
+    const BOUND: f32 = (1 << 30) as f32;
+    let number = if number > -BOUND { number } else { -BOUND };
+    let number = if number < BOUND { number } else { BOUND };
+    // SAFETY: it is neither NaN nor beyond the range of an i32.
+    unsafe { number.to_int_unchecked() }
+}
+
 #[cfg(all(test, feature = "detect"))]
 mod tests {
     use super::*;
     use std::vec::Vec;
+
+    #[test]
+    fn integer_parts_equal_casts_within_the_bounds() {
+        let some = [0.0, -0.0, 0.99, -0.99, 1.5, -2.5, 8_388_609.0, -1e9, 1_073_741_824.0];
+        for number in some {
+            assert_eq!(integer_part(number), number as i32, "{number}");
+        }
+        let beyond = [f32::INFINITY, 3e9, f32::NEG_INFINITY, -3e9, f32::NAN].map(integer_part);
+        assert_eq!(beyond, [1 << 30, 1 << 30, -1 << 30, -1 << 30, -1 << 30]);
+    }
 
     #[inline(always)]
     fn sums(values: &[f32]) -> [f32; 8] {
