@@ -64,12 +64,21 @@ impl SensorPaths {
     }
 
     /// The fraction of the sweep that has passed at an offset from its stamp, s: 0 to 1.
+    #[inline(always)]
     pub fn part(&self, offset_s: f32) -> f32 {
         ((offset_s - self.from_s) * self.per_s).clamp(0.0, 1.0)
     }
 
+    /// Position of a sensor as the sweep begins, voxels from the window's corner, and its
+    /// displacement until the sweep ends.
+    #[inline(always)]
+    pub fn line(&self, sensor: usize) -> [[f32; 3]; 2] {
+        [self.from[sensor], self.by[sensor]]
+    }
+
     /// Position of a sensor at a fraction of the sweep, voxels from the window's corner.
     pub fn at(&self, sensor: usize, part: f32) -> [f32; 3] {
-        from_fn(|a| self.from[sensor][a] + part * self.by[sensor][a])
+        let [from, by] = self.line(sensor);
+        from_fn(|a| from[a] + part * by[a])
     }
 }

@@ -3,14 +3,11 @@
 use crate::return_clock::{TURN, pseudo_angle};
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
-use core::array::from_fn;
 use raywake_simd::integer_part;
 
 /// Number of directions in the plane that are distinguished, by [`pseudo_angle`]: each 0.2 to 0.5
 /// degrees wide.
 pub const AZIMUTHS: usize = 1024;
-/// Number of rays that are examined together; the last ones with whatever follows them in memory.
-pub const LANES: usize = 8;
 /// Steps per voxel that ends of rays are rounded to, 5 mm.
 pub const STEPS: f32 = 64.0;
 /// Ends farther than this, voxels along an axis, are pulled in along their ray: what the type of a
@@ -21,62 +18,89 @@ const _: () = assert!(FAR * STEPS <= i16::MAX as f32);
 /// of a spinning sensor are below it.
 const MIDDLE_SLOPE: f32 = 0.25;
 
+/// Number of rays in a batch: loops as long as this are vectorised.
+pub const BATCH: usize = 64;
+
 /// Rays waiting to be sorted.
 pub struct RayBatch {
     pub len: usize,
     /// Where each ended, by axis, voxels from the window's corner.
-    at: [[f32; LANES]; 3],
-    /// The part of the sweep that had passed by then.
-    pub part: [f32; LANES],
-    pub sensor: [usize; LANES],
+    at: [[f32; BATCH]; 3],
+    /// When each was measured, s after the sweep's stamp.
+    offset_s: [f32; BATCH],
+    pub sensor: [u32; BATCH],
 }
 
 /// Rays of a batch as they are kept. Entries beyond its length are meaningless.
 pub struct KeptRays {
+    /// The part of the sweep that had passed by the time of each.
+    pub part: [f32; BATCH],
     /// Their ends, by axis, steps from the sensor.
-    pub end: [[i16; LANES]; 3],
+    pub end: [[i16; BATCH]; 3],
     /// [`azimuth`] of each.
-    pub azimuth: [u16; LANES],
+    pub azimuth: [u16; BATCH],
     /// [`slope`] of each.
-    pub slope: [f32; LANES],
+    pub slope: [f32; BATCH],
 }
 
 impl RayBatch {
     pub const fn new() -> RayBatch {
-        RayBatch { len: 0, at: [[0.0; LANES]; 3], part: [0.0; LANES], sensor: [0; LANES] }
+        RayBatch { len: 0, at: [[0.0; BATCH]; 3], offset_s: [0.0; BATCH], sensor: [0; BATCH] }
     }
 
     /// Adds a ray to a batch that is not full. Returns whether it is full now.
     #[inline(always)]
-    pub fn push(&mut self, paths: &SensorPaths, sensor: usize, placed: &Placed) -> bool {
+    pub fn push(&mut self, sensor: u32, placed: &Placed) -> bool {
         let n = self.len;
         for (axis, at) in self.at.iter_mut().zip(placed.at) {
             axis[n] = at;
         }
-        (self.part[n], self.sensor[n]) = (paths.part(placed.offset_s), sensor);
+        (self.offset_s[n], self.sensor[n]) = (placed.offset_s, sensor);
         self.len += 1;
-        self.len == LANES
+        self.len == BATCH
     }
 
     /// Its rays as they are kept.
     #[inline(always)]
     pub fn kept(&self, paths: &SensorPaths) -> KeptRays {
-        let eye: [[f32; 3]; LANES] = from_fn(|l| paths.at(self.sensor[l], self.part[l]));
-        let [x, y, z]: [[f32; LANES]; 3] = from_fn(|a| from_fn(|l| self.at[a][l] - eye[l][a]));
-        let mut scale = [0.0; LANES];
-        let mut azimuths = [0; LANES];
-        for l in 0..LANES {
-            let farthest = x[l].abs().max(y[l].abs()).max(z[l].abs());
-            scale[l] = STEPS * (FAR / farthest).min(1.0);
-            azimuths[l] = azimuth([x[l], y[l]]);
+        let mut kept = KeptRays {
+            part: [0.0; BATCH],
+            end: [[0; BATCH]; 3],
+            azimuth: [0; BATCH],
+            slope: [0.0; BATCH],
+        };
+        for (part, offset_s) in kept.part.iter_mut().zip(self.offset_s) {
+            *part = paths.part(offset_s);
         }
-        let whole = |v: [f32; LANES]| -> [i32; LANES] { from_fn(|l| integer_part(v[l] * scale[l])) };
-        let end = [x, y, z].map(whole);
-        let mut slopes = [0.0; LANES];
-        for l in 0..LANES {
-            slopes[l] = slope(end.each_ref().map(|axis| axis[l] as f32));
+        let [x, y, z] = self.from_sensors(paths, &kept.part);
+        let [end_x, end_y, end_z] = &mut kept.end;
+        for n in 0..BATCH {
+            let farthest = x[n].abs().max(y[n].abs()).max(z[n].abs());
+            let scale = STEPS * (FAR / farthest).min(1.0);
+            let end = [x[n], y[n], z[n]].map(|v| integer_part(v * scale));
+            [end_x[n], end_y[n], end_z[n]] = end.map(|v| v as i16);
+            kept.azimuth[n] = azimuth([x[n], y[n]]);
+            kept.slope[n] = slope(end.map(|v| v as f32));
         }
-        KeptRays { end: end.map(|axis| axis.map(|v| v as i16)), azimuth: azimuths, slope: slopes }
+        kept
+    }
+
+    /// The ends by axis, voxels from the sensor.
+    #[inline(always)]
+    fn from_sensors(&self, paths: &SensorPaths, part: &[f32; BATCH]) -> [[f32; BATCH]; 3] {
+        let (mut from_sensor, mut from) = ([[0.0; BATCH]; 3], 0);
+        for same in self.sensor.chunk_by(|a, b| a == b) {
+            let to = from + same.len();
+            let [start, by] = paths.line(same[0] as usize);
+            for (axis, out) in from_sensor.iter_mut().enumerate() {
+                let at = self.at[axis][from..to].iter().zip(&part[from..to]);
+                for (out, (at, part)) in out[from..to].iter_mut().zip(at) {
+                    *out = at - (start[axis] + part * by[axis]);
+                }
+            }
+            from = to;
+        }
+        from_sensor
     }
 }
 

@@ -9,7 +9,7 @@
 //! 3D computer objects", PAMI 1995) a place is compared with what its direction shows, not with
 //! what is near it in space.
 
-use super::ray_batch::{AZIMUTHS, LANES, RayBatch, STEPS, azimuth, slope};
+use super::ray_batch::{AZIMUTHS, RayBatch, STEPS, azimuth, slope};
 use super::sample::{SurfaceWeight, minus, weighed};
 use super::scaled::Scaled;
 use crate::params::{SENSORS_MAX, SIGHTLINES_MAX};
@@ -30,6 +30,9 @@ const ROUNDS: usize = 3;
 /// average, of which 40 are left (KITTI drive 0005).
 const BANDS: usize = 16;
 const _: () = assert!(SENSORS_MAX <= BANDS);
+
+/// Number of rays that are examined together; the last ones with whatever follows them in memory.
+const LANES: usize = 8;
 
 /// Scratch of [`Sightlines::fill`]: rays in the order they come.
 pub(super) type Unsorted = [UnsortedRay; SIGHTLINES_MAX];
@@ -99,8 +102,7 @@ impl Sightlines {
                 let (mut batch, mut count) = (RayBatch::new(), 0);
                 for (n, placed) in placed.iter().enumerate() {
                     if is_kept(n, share) && placed.at[0].is_finite() {
-                        let sensor = points.get(n).sensor as usize;
-                        if batch.push(paths, sensor, placed) {
+                        if batch.push(points.get(n).sensor, placed) {
                             count += self.count(&batch, &mut rays[count..]);
                             batch.len = 0;
                         }
@@ -132,10 +134,10 @@ impl Sightlines {
         let kept = batch.kept(&self.paths);
         let added = batch.len.min(rays.len());
         for (l, ray) in rays[..added].iter_mut().enumerate() {
-            let (sensor, azimuth) = (batch.sensor[l], usize::from(kept.azimuth[l]));
+            let (sensor, azimuth) = (batch.sensor[l] as usize, usize::from(kept.azimuth[l]));
             let part = &mut self.part[sensor][azimuth];
             if *part == NO_PART {
-                *part = (batch.part[l] * PARTS) as u16 + 1;
+                *part = (kept.part[l] * PARTS) as u16 + 1;
             }
             let cell = self.first_cell(sensor, self.band(kept.slope[l])) + azimuth;
             let end = kept.end.each_ref().map(|axis| axis[l]);
