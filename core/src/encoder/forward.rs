@@ -9,12 +9,11 @@ use super::load::EncoderWeights;
 use super::rows::{Plane, each_row, gathered};
 use super::{ColumnScores, FINE, PaddedWindow};
 use crate::team::Team;
+use raywake_simd::Simd;
 
 /// Cells whose sums are computed together. With 8, layers take up to a fifth longer (AVX2, one core
 /// of an AMD EPYC, each layer measured alone).
 const CELLS: usize = 16;
-/// Inputs accumulated into a sum at a time.
-const INPUTS: usize = 8;
 
 /// Sums of a cell, biases included, and the shifts that scale them back to activations.
 struct CellSums<'a, const OUT: usize> {
@@ -25,7 +24,11 @@ struct CellSums<'a, const OUT: usize> {
 impl<const OUT: usize> CellSums<'_, OUT> {
     #[inline(always)]
     fn activations(&self) -> [u8; OUT] {
-        core::array::from_fn(|n| activation(self.sums[n], 0, u32::from(self.shifts[n])))
+        let mut activations = [0; OUT];
+        for n in 0..OUT {
+            activations[n] = activation(self.sums[n], 0, u32::from(self.shifts[n]));
+        }
+        activations
     }
 
     /// Adds the shifted sums to the activations of a cell.
@@ -39,7 +42,11 @@ impl<const OUT: usize> CellSums<'_, OUT> {
 
     #[inline(always)]
     fn scores(&self) -> [i8; OUT] {
-        core::array::from_fn(|n| (self.sums[n] >> self.shifts[n]).clamp(-TOP, TOP) as i8)
+        let mut scores = [0; OUT];
+        for n in 0..OUT {
+            scores[n] = (self.sums[n] >> self.shifts[n]).clamp(-TOP, TOP) as i8;
+        }
+        scores
     }
 }
 
@@ -54,13 +61,17 @@ impl EncoderWeights {
     #[inline(always)]
     fn column(&self, masks: u32) -> [u8; COLUMN_CHANNELS] {
         let bytes = masks.to_le_bytes();
-        core::array::from_fn(|channel| {
-            let mut sum = 0;
-            for (table, byte) in self.bytes.iter().zip(bytes) {
-                sum += i32::from(table[byte as usize][channel]);
+        let mut sums = [0; COLUMN_CHANNELS];
+        for (table, byte) in self.bytes.iter().zip(bytes) {
+            for (sum, of_byte) in sums.iter_mut().zip(&table[byte as usize]) {
+                *sum += i32::from(*of_byte);
             }
-            activation(sum, self.biases[channel], u32::from(self.shifts[channel]))
-        })
+        }
+        let mut activations = [0; COLUMN_CHANNELS];
+        for n in 0..COLUMN_CHANNELS {
+            activations[n] = activation(sums[n], self.biases[n], u32::from(self.shifts[n]));
+        }
+        activations
     }
 
     /// Weights, biases and shifts of a layer.
@@ -81,6 +92,7 @@ impl EncoderWeights {
     #[inline(always)]
     fn dense<const IN: usize, const OUT: usize>(
         &self,
+        simd: Simd,
         layer: usize,
         count: usize,
         input: impl Fn(usize) -> [u8; IN],
@@ -91,13 +103,11 @@ impl EncoderWeights {
         let (mut inputs, mut sums) = ([[0; IN]; CELLS], [[0; OUT]; CELLS]);
         for from in (0..count).step_by(CELLS) {
             let cells = CELLS.min(count - from);
-            inputs[..cells].iter_mut().enumerate().for_each(|(n, x)| *x = input(from + n));
-            sums[..cells].fill(*biases);
-            for (at, weights) in weights.as_chunks().0.iter().enumerate() {
-                for (sums, x) in sums[..cells].iter_mut().zip(&inputs) {
-                    add_dense(sums, &x.as_chunks().0[at], weights);
-                }
+            for (n, x) in inputs[..cells].iter_mut().enumerate() {
+                *x = input(from + n).map(i16::from);
             }
+            sums[..cells].fill(*biases);
+            simd.add_products(weights, &inputs[..cells], &mut sums[..cells]);
             sums[..cells].iter().enumerate().for_each(|(n, sums)| {
                 done(from + n, CellSums { sums, shifts });
             });
@@ -143,7 +153,7 @@ impl EncoderWeights {
             to,
             side * FINE_CHANNELS,
             #[inline(always)]
-            move |row, out| {
+            move |simd, row, out| {
                 let (out, input) = (cells::<FINE_CHANNELS>(out), |at| {
                     let mut x = [0; 4 * COLUMN_CHANNELS];
                     for (n, x) in cells(&mut x).iter_mut().enumerate() {
@@ -151,7 +161,7 @@ impl EncoderWeights {
                     }
                     x
                 });
-                self.dense(DOWN_FINE, side, input, |at, sums| out[at] = sums.activations());
+                self.dense(simd, DOWN_FINE, side, input, |at, sums| out[at] = sums.activations());
             },
         );
     }
@@ -170,10 +180,10 @@ impl EncoderWeights {
             to,
             side * OUT,
             #[inline(always)]
-            move |row, out| {
+            move |simd, row, out| {
                 let out = cells::<OUT>(out);
                 let input = |at| gathered::<IN, ALL>(&from, row, at);
-                self.dense(layer, side, input, |at, sums| out[at] = sums.activations());
+                self.dense(simd, layer, side, input, |at, sums| out[at] = sums.activations());
             },
         );
     }
@@ -194,7 +204,7 @@ impl EncoderWeights {
             beside,
             side * CHANNELS,
             #[inline(always)]
-            move |row, out| self.depthwise(first, from, row, cells(out)),
+            move |_, row, out| self.depthwise(first, from, row, cells(out)),
         );
         self.add_dense_layer(team, first + 1, Plane::<CHANNELS> { side, cells: beside }, level);
     }
@@ -212,9 +222,9 @@ impl EncoderWeights {
             to,
             from.side * CHANNELS,
             #[inline(always)]
-            move |row, out| {
+            move |simd, row, out| {
                 let (out, input) = (cells::<CHANNELS>(out), |at| *from.at(row, at));
-                self.dense(layer, from.side, input, |at, sums| sums.add_to(&mut out[at]));
+                self.dense(simd, layer, from.side, input, |at, sums| sums.add_to(&mut out[at]));
             },
         );
     }
@@ -233,10 +243,11 @@ impl EncoderWeights {
             to,
             2 * length,
             #[inline(always)]
-            move |row, out| {
+            move |simd, row, out| {
                 let (upper, lower) = out.split_at_mut(length);
                 let mut lines = [cells::<OUT>(upper), cells::<OUT>(lower)];
                 self.dense(
+                    simd,
                     layer,
                     from.side,
                     |at| *from.at(row, at),
@@ -262,10 +273,12 @@ impl EncoderWeights {
             to,
             from.side * COLUMN_CHANNELS,
             #[inline(always)]
-            move |row, out| {
+            move |simd, row, out| {
                 let out = cells::<COLUMN_CHANNELS>(out);
                 let input = |at| *from.at(row, at);
-                self.dense(UP_COLUMN, from.side, input, |at, sums| out[at] = sums.activations());
+                self.dense(simd, UP_COLUMN, from.side, input, |at, sums| {
+                    out[at] = sums.activations()
+                });
             },
         );
     }
@@ -274,6 +287,7 @@ impl EncoderWeights {
     #[inline(always)]
     pub(super) fn head<'a>(
         &self,
+        simd: Simd,
         count: usize,
         masks: impl Fn(usize) -> u32,
         around: impl Fn(usize) -> &'a [u8; COLUMN_CHANNELS],
@@ -288,27 +302,15 @@ impl EncoderWeights {
                 cells(&mut x).copy_from_slice(&[*around(from + n), own]);
                 x
             };
-            self.dense(HEAD, columns, input, |n, sums| hidden[n] = sums.activations());
-            self.dense(SCORE, columns, |n| hidden[n], |n, sums| done(from + n, sums.scores()));
+            self.dense(simd, HEAD, columns, input, |n, sums| hidden[n] = sums.activations());
+            self.dense(
+                simd,
+                SCORE,
+                columns,
+                |n| hidden[n],
+                |n, sums| done(from + n, sums.scores()),
+            );
         }
-    }
-}
-
-/// Adds the products of some of a cell's inputs to its sums, in pairs, which processors compute in
-/// one instruction.
-#[inline(always)]
-fn add_dense<const OUT: usize>(
-    sums: &mut [i32; OUT],
-    x: &[u8; INPUTS],
-    weights: &[[[i16; 2]; OUT]; INPUTS / 2],
-) {
-    let x = x.map(i32::from);
-    let [v, w, y, z] = weights;
-    for n in 0..OUT {
-        let pair = |at: usize, of: &[[i16; 2]; OUT]| {
-            x[at] * i32::from(of[n][0]) + x[at + 1] * i32::from(of[n][1])
-        };
-        sums[n] += pair(0, v) + pair(2, w) + pair(4, y) + pair(6, z);
     }
 }
 

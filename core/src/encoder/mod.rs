@@ -221,7 +221,7 @@ impl Encoder {
             &mut self.scores[..side * side],
             side,
             #[inline(always)]
-            move |i, out| {
+            move |simd, i, out| {
                 let row = &columns[i * side..][..side];
                 out.fill([0; SCORES]);
                 let (mut solid, mut count) = ([0u16; SIDE_MAX], 0);
@@ -232,7 +232,7 @@ impl Encoder {
                 let at = |n: usize| usize::from(solid[n]);
                 let around = |n| around.at((i + phase[0]) / 2, (at(n) + phase[1]) / 2);
                 let done = |n, scores| out[at(n)] = scores;
-                weights.head(count, |n| row[at(n)][0], around, done);
+                weights.head(simd, count, |n| row[at(n)][0], around, done);
             },
         );
     }

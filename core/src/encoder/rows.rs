@@ -1,6 +1,7 @@
 //! Levels of the pyramid as rows of cells.
 
 use crate::team::{Team, share};
+use raywake_simd::Simd;
 
 /// A square level, with all channels of a cell contiguous.
 #[derive(Clone, Copy)]
@@ -44,13 +45,13 @@ pub fn each_row<T: Send>(
     team: &impl Team,
     out: &mut [T],
     length: usize,
-    fill: impl Fn(usize, &mut [T]) + Sync + Copy,
+    fill: impl Fn(Simd, usize, &mut [T]) + Sync + Copy,
 ) {
     let (simd, rows) = (team.simd(), out.len() / length);
     share(team, 1, 0..rows, out, length, &move |rows, out| {
         simd.run(
             #[inline(always)]
-            move || fill(rows.start, out),
+            move || fill(simd, rows.start, out),
         );
     });
 }

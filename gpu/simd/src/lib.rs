@@ -67,6 +67,28 @@ impl Simd {
         }
     }
 
+    /// Adds to the sums of every cell the products of its inputs and the weights, which come in
+    /// pairs of inputs: `inputs[c][2 p + k]` times `weights[p][n][k]` to `sums[c][n]`. To be called
+    /// within [`Simd::run`].
+    ///
+    /// # Panics
+    /// If there are not half as many pairs as inputs.
+    #[inline(always)]
+    pub fn add_products<const IN: usize, const OUT: usize>(
+        self,
+        weights: &[[[i16; 2]; OUT]],
+        inputs: &[[i16; IN]],
+        sums: &mut [[i32; OUT]],
+    ) {
+        assert!(2 * weights.len() == IN);
+        match self.0 {
+            // SAFETY: as in `run`.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => unsafe { products::avx2(weights, inputs, sums) },
+            Width::Baseline => products::add_all(weights, inputs, sums),
+        }
+    }
+
     /// Does `work` with these instructions. Code that is to use them must be inlined into `work`,
     /// and `work` itself too: put `#[inline(always)]` on the closure and on what it calls.
     #[inline(always)]
@@ -79,6 +101,8 @@ impl Simd {
         }
     }
 }
+
+mod products;
 
 /// The integer part of a number; beyond 2^30 on either side that bound, for NaN the lower one.
 ///
@@ -106,6 +130,44 @@ mod tests {
         }
         let beyond = [f32::INFINITY, 3e9, f32::NEG_INFINITY, -3e9, f32::NAN].map(integer_part);
         assert_eq!(beyond, [1 << 30, 1 << 30, -1 << 30, -1 << 30, -1 << 30]);
+    }
+
+    fn check_products<const OUT: usize>() {
+        const IN: usize = 12;
+        let mut state = 1u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) as i16
+        };
+        let weights: [[[i16; 2]; OUT]; IN / 2] =
+            core::array::from_fn(|_| core::array::from_fn(|_| [next() / 8, next() / 8]));
+        let inputs: [[i16; IN]; 7] = core::array::from_fn(|_| core::array::from_fn(|_| next() / 8));
+        for simd in Simd::available() {
+            let mut sums = [[5; OUT]; 7];
+            simd.run(
+                #[inline(always)]
+                || simd.add_products(&weights, &inputs, &mut sums),
+            );
+            for (cell, sums) in sums.iter().enumerate() {
+                for (n, sum) in sums.iter().enumerate() {
+                    let product = |at: usize| {
+                        i32::from(inputs[cell][at]) * i32::from(weights[at / 2][n][at % 2])
+                    };
+                    let wanted = 5 + (0..IN).map(product).sum::<i32>();
+                    assert_eq!(*sum, wanted, "{}, {OUT} sums", simd.name());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn products_are_the_same_for_any_number_of_sums() {
+        check_products::<9>();
+        check_products::<16>();
+        check_products::<24>();
+        check_products::<32>();
+        check_products::<40>();
+        check_products::<48>();
     }
 
     #[inline(always)]
