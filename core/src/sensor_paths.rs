@@ -3,6 +3,7 @@
 use crate::frame::central;
 use crate::params::SENSORS_MAX;
 use crate::prepare::Placement;
+use crate::thinning::TakenPoints;
 use core::array::from_fn;
 
 /// The position of each sensor over a sweep: on a straight line, from which a sensor 2 m from the
@@ -61,6 +62,12 @@ impl SensorPaths {
         let mut paths = SensorPaths { sensors: 2, ..SensorPaths::NOWHERE };
         (paths.from[0], paths.from[1]) = (first, second);
         paths
+    }
+
+    /// The sensor of a return that is placed. If there is only one, nothing is looked up.
+    #[inline(always)]
+    pub fn sensor_of(&self, points: TakenPoints, n: usize) -> u32 {
+        if self.sensors == 1 { 0 } else { points.get(n).sensor }
     }
 
     /// The fraction of the sweep that has passed at an offset from its stamp, s: 0 to 1.

@@ -10,6 +10,7 @@ use crate::params::{
 };
 use crate::record::NONE;
 use crate::sweep::Placed;
+use raywake_simd::integer_part;
 
 /// Words in a mask of the sub-voxels of a column.
 const MASK_WORDS: usize =
@@ -56,7 +57,7 @@ impl ColumnSort {
         returns: SweepReturns,
         apart: &mut [bool],
     ) -> (usize, u32) {
-        let SweepReturns { points, placed, columns, .. } = returns;
+        let SweepReturns { points, placed, columns, sensors: paths, .. } = returns;
         let (mut count, mut sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
             *apart = false;
@@ -68,7 +69,7 @@ impl ColumnSort {
             if (scaled.height_min..scaled.height_max).contains(&height) {
                 self.end[column as usize] += 1;
                 self.listed[count] = n as u32;
-                sensors |= 1 << points.get(n).sensor;
+                sensors |= 1 << paths.sensor_of(points, n);
                 count += 1;
             }
         }
@@ -124,7 +125,8 @@ impl ThinnedReturns {
         let ThinningSource { side, returns, sensors, .. } = source;
         // In column order these look-ups are scattered: only done if there are several sensors.
         let only = sensors.is_power_of_two().then(|| sensors.trailing_zeros());
-        let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points.get(n as usize).sensor);
+        let sensor_of =
+            |n: u32| only.unwrap_or_else(|| returns.sensors.sensor_of(returns.points, n as usize));
         self.places.clear();
         let (mut from, mut dropped) = (0, 0);
         for (c, &end) in sorted.end[..side * side].iter().enumerate() {
@@ -156,16 +158,16 @@ impl ThinnedReturns {
         let mut taken = [0u32; MASK_WORDS];
         let mut dropped = 0;
         for Placed { at: p, offset_s } in returns {
-            let part = |v: f32| (v * scale).clamp(0.0, scale - 1.0) as usize;
+            let part = |v: f32| integer_part((v * scale).clamp(0.0, scale - 1.0)) as usize;
             let height = detail.ground.above(column, p[2]);
-            let level = (height * scale) as usize;
+            let level = integer_part(height * scale).max(0) as usize;
             let bit =
                 (level * subvoxels + part(p[0] - corner[0])) * subvoxels + part(p[1] - corner[1]);
             let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
             if *word & 1 << (bit % 32) == 0 {
                 *word |= 1 << (bit % 32);
                 if self.places.push(p, sensor as u32, offset_s) {
-                    detail.levels[column] |= 1 << height as u32;
+                    detail.levels[column] |= 1 << integer_part(height).max(0);
                 } else {
                     dropped += 1;
                 }
