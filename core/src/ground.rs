@@ -8,6 +8,7 @@
 //! Parameters are in metres; positions and heights are in the caller's unit, the edge of a column.
 
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
+use core::ops::Range;
 
 /// Minimum number of columns along an edge of a cell: bounds the number of cells.
 const CELL_COLUMNS_MIN: usize = 4;
@@ -137,18 +138,20 @@ impl GroundEstimator {
         let thick = length(params.ground_thickness_m)..length(OVERHANGING_M);
         self.find_thick(returns, thick);
         let [tolerance, slope] = [length(params.ground_tolerance_m), params.ground_slope];
+        // Only the ground of those is ever raised: few columns of a street.
+        let mut raised = [0; COLUMNS_MAX.div_ceil(64)];
+        for (n, word) in raised[..(side * side).div_ceil(64)].iter_mut().enumerate() {
+            let columns = 64 * n..(64 * n + 64).min(side * side);
+            *word = !self.thick[n] & self.above(columns, tolerance, ground);
+        }
         for _ in 0..CLIMBS {
-            (0..side * side).for_each(|c| self.climb(side, c, slope, tolerance, ground));
-            (0..side * side).rev().for_each(|c| self.climb(side, c, slope, tolerance, ground));
+            set_bits(&raised).for_each(|c| self.climb(side, c, slope, tolerance, ground));
+            set_bits(&raised).rev().for_each(|c| self.climb(side, c, slope, tolerance, ground));
         }
     }
 
     /// Finds columns with returns that are higher than their lowest by an amount within `by`.
-    fn find_thick(
-        &mut self,
-        returns: impl Iterator<Item = (usize, [f32; 3])>,
-        by: core::ops::Range<f32>,
-    ) {
+    fn find_thick(&mut self, returns: impl Iterator<Item = (usize, [f32; 3])>, by: Range<f32>) {
         self.thick.fill(0);
         for (column, [_, _, z]) in returns {
             let bit = u64::from(by.contains(&(z - self.low[column])));
@@ -156,8 +159,16 @@ impl GroundEstimator {
         }
     }
 
-    /// Raises the ground of a thin column to its lowest return if the ground of a column beside it
-    /// continues there.
+    /// Columns, at most 64, whose lowest return is above their ground, one bit each.
+    fn above(&self, columns: Range<usize>, tolerance: f32, ground: &GroundHeights) -> u64 {
+        let pairs = self.low[columns.clone()].iter().zip(&ground.0[columns]);
+        pairs.enumerate().fold(0, |bits, (n, (low, height))| {
+            bits | u64::from((*low > *height + tolerance) & low.is_finite()) << n
+        })
+    }
+
+    /// Raises the ground of a thin column to its lowest return, if that is above it and the ground
+    /// of a column beside it continues there.
     fn climb(
         &self,
         side: usize,
@@ -168,7 +179,7 @@ impl GroundEstimator {
     ) {
         let is_thin = |c: usize| self.thick[c / 64] >> (c % 64) & 1 == 0;
         let low = self.low[column];
-        if !(low > ground.0[column] + tolerance && low.is_finite() && is_thin(column)) {
+        if ground.0[column] == low {
             return;
         }
         let (i, j) = (column / side, column % side);
@@ -213,4 +224,10 @@ impl GroundEstimator {
         }
         self.height[..n * n].copy_from_slice(&self.extrapolated[..n * n]);
     }
+}
+
+/// Indices of the bits that are set, ascending.
+fn set_bits(words: &[u64]) -> impl DoubleEndedIterator<Item = usize> {
+    let some = words.iter().enumerate().filter(|(_, word)| **word != 0);
+    some.flat_map(|(n, word)| (0..64).filter(move |b| word >> b & 1 != 0).map(move |b| 64 * n + b))
 }
