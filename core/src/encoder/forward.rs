@@ -25,8 +25,8 @@ impl<const OUT: usize> CellSums<'_, OUT> {
     #[inline(always)]
     fn activations(&self) -> [u8; OUT] {
         let mut activations = [0; OUT];
-        for n in 0..OUT {
-            activations[n] = activation(self.sums[n], 0, u32::from(self.shifts[n]));
+        for ((to, sum), shift) in activations.iter_mut().zip(self.sums).zip(self.shifts) {
+            *to = activation(*sum, 0, u32::from(*shift));
         }
         activations
     }
@@ -43,8 +43,8 @@ impl<const OUT: usize> CellSums<'_, OUT> {
     #[inline(always)]
     fn scores(&self) -> [i8; OUT] {
         let mut scores = [0; OUT];
-        for n in 0..OUT {
-            scores[n] = (self.sums[n] >> self.shifts[n]).clamp(-TOP, TOP) as i8;
+        for ((score, sum), shift) in scores.iter_mut().zip(self.sums).zip(self.shifts) {
+            *score = (sum >> shift).clamp(-TOP, TOP) as i8;
         }
         scores
     }

@@ -72,7 +72,7 @@ impl RayBatch {
         for (part, offset_s) in kept.part.iter_mut().zip(self.offset_s) {
             *part = paths.part(offset_s);
         }
-        let [x, y, z] = self.from_sensors(paths, &kept.part);
+        let [x, y, z] = self.relative_ends(paths, &kept.part);
         let [end_x, end_y, end_z] = &mut kept.end;
         for n in 0..BATCH {
             let farthest = x[n].abs().max(y[n].abs()).max(z[n].abs());
@@ -87,12 +87,12 @@ impl RayBatch {
 
     /// The ends by axis, voxels from the sensor.
     #[inline(always)]
-    fn from_sensors(&self, paths: &SensorPaths, part: &[f32; BATCH]) -> [[f32; BATCH]; 3] {
-        let (mut from_sensor, mut from) = ([[0.0; BATCH]; 3], 0);
+    fn relative_ends(&self, paths: &SensorPaths, part: &[f32; BATCH]) -> [[f32; BATCH]; 3] {
+        let (mut relative, mut from) = ([[0.0; BATCH]; 3], 0);
         for same in self.sensor.chunk_by(|a, b| a == b) {
             let to = from + same.len();
             let [start, by] = paths.line(same[0] as usize);
-            for (axis, out) in from_sensor.iter_mut().enumerate() {
+            for (axis, out) in relative.iter_mut().enumerate() {
                 let at = self.at[axis][from..to].iter().zip(&part[from..to]);
                 for (out, (at, part)) in out[from..to].iter_mut().zip(at) {
                     *out = at - (start[axis] + part * by[axis]);
@@ -100,7 +100,7 @@ impl RayBatch {
             }
             from = to;
         }
-        from_sensor
+        relative
     }
 }
 

@@ -101,11 +101,10 @@ impl Sightlines {
             || {
                 let (mut batch, mut count) = (RayBatch::new(), 0);
                 for (n, placed) in placed.iter().enumerate() {
-                    if is_kept(n, share) && placed.at[0].is_finite() {
-                        if batch.push(paths.sensor_of(points, n), placed) {
-                            count += self.count(&batch, &mut rays[count..]);
-                            batch.len = 0;
-                        }
+                    let taken = is_kept(n, share) && placed.at[0].is_finite();
+                    if taken && batch.push(paths.sensor_of(points, n), placed) {
+                        count += self.count(&batch, &mut rays[count..]);
+                        batch.len = 0;
                     }
                 }
                 count + self.count(&batch, &mut rays[count..])
