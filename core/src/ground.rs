@@ -138,7 +138,7 @@ impl GroundEstimator {
         let thick = length(params.ground_thickness_m)..length(OVERHANGING_M);
         self.find_thick(returns, thick);
         let [tolerance, slope] = [length(params.ground_tolerance_m), params.ground_slope];
-        // Only the ground of those is ever raised: few columns of a street.
+        // Only thin columns whose lowest return is above their ground can be raised.
         let mut raised = [0; COLUMNS_MAX.div_ceil(64)];
         for (n, word) in raised[..(side * side).div_ceil(64)].iter_mut().enumerate() {
             let columns = 64 * n..(64 * n + 64).min(side * side);

@@ -3,7 +3,7 @@
 use raywake_core::params::{FOREGROUND_MAX, ROW, ROW_WORDS};
 use raywake_core::record::{Column, NONE, SweepUniform};
 use raywake_core::stages::occupancy_constancy::{
-    COST_MAX, SCORES_MAX, SHIPPED, WEIGHT_WORDS, load,
+    COST_MAX, SCORES_MAX, SHIPPED, WEIGHT_WORDS, load, occupancy_constancy_by_lines,
 };
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{OCCUPANCY_CONSTANCY, WINDOW};
@@ -57,8 +57,30 @@ fn check_constancy(
         now,
         halves,
     );
+    check_lines(case, &step, with, foreground, [before, now], halves);
     if let Some(outcome) = bench.run() {
         outcome.check(&format!("{case}, {} rows", foreground.len()), &[("pair_cost", &cost)]);
+    }
+}
+
+/// What the scalar backend runs instead of the twin, for the list and the list reversed.
+fn check_lines(
+    case: &str,
+    step: &SweepUniform,
+    with: &Classifier,
+    foreground: &[u32],
+    [before, now]: [&[Column]; 2],
+    costs: &[u16],
+) {
+    let mut sources = foreground.to_vec();
+    let mut wanted = costs[..foreground.len() * ROW].chunks(ROW).collect::<Vec<_>>();
+    for order in ["ascending", "descending"] {
+        let (weights, of_scores) = (&with.weights, &with.costs);
+        let mut found = vec![0; sources.len() * ROW];
+        occupancy_constancy_by_lines(step, weights, of_scores, &sources, before, now, &mut found);
+        assert!(found.chunks(ROW).eq(wanted.iter().copied()), "{case}, {order}");
+        sources.reverse();
+        wanted.reverse();
     }
 }
 

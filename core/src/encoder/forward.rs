@@ -11,8 +11,8 @@ use super::{ColumnScores, FINE, PaddedWindow};
 use crate::team::Team;
 use raywake_simd::Simd;
 
-/// Cells whose sums are computed together. With 8, layers take up to a fifth longer (AVX2, one core
-/// of an AMD EPYC, each layer measured alone).
+/// Cells whose inputs are gathered together, and whose sums are computed together. A multiple of
+/// the number that [`Simd::add_products`] holds in registers; not measured otherwise.
 const CELLS: usize = 16;
 
 /// Sums of a cell, biases included, and the shifts that scale them back to activations.

@@ -4,8 +4,8 @@
 /// OS1-128 at 2048 x 10. (The dissertation's n_max is 150,000.)
 pub const POINTS_MAX: usize = 262_144;
 /// Levels of a column: free and occupied masks share one 32-bit word. No profile needs more.
-/// Compared with 32 levels this halves the memory traffic, and a pair of columns is scored with
-/// four byte lookups (scalar) or 32 masked additions (kernel).
+/// Compared with 32 levels this halves the memory traffic, and the masks of 16 columns fit in a
+/// vector of AVX2.
 pub const LEVELS_MAX: usize = 16;
 /// Columns of the flow window along an axis: 101 m at 0.30 m.
 pub const SIDE_MAX: usize = 337;

@@ -7,8 +7,10 @@ use crate::return_clock::slot_of;
 use crate::sweep::Point;
 use raywake_simd::integer_part;
 
-/// Number of returns placed together. Loops as long as this are vectorised; and a processor waits
-/// for numbers that it reads together right after they were written one by one.
+/// Number of returns placed together. Loops as long as this are vectorised as a whole; shorter ones
+/// are unrolled first and then only in part. And a wide load stalls right after narrow stores to
+/// the same place. With 8, casting rays takes twice as long (3.8 ms a sweep against 1.9: KITTI
+/// drive 0005, one core of an AMD EPYC, Zen 5). Other lengths were not measured.
 pub(super) const BATCH: usize = 64;
 
 /// Returns waiting to be placed.

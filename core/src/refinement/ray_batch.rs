@@ -18,7 +18,7 @@ const _: () = assert!(FAR * STEPS <= i16::MAX as f32);
 /// of a spinning sensor are below it.
 const MIDDLE_SLOPE: f32 = 0.25;
 
-/// Number of rays in a batch: loops as long as this are vectorised.
+/// Number of rays in a batch, as of returns in one that is placed.
 pub const BATCH: usize = 64;
 
 /// Rays waiting to be sorted.
@@ -108,7 +108,7 @@ impl RayBatch {
 #[inline(always)]
 pub fn azimuth([x, y]: [f32; 2]) -> u16 {
     let azimuth = integer_part(pseudo_angle(x, y) * (AZIMUTHS as f32 / TURN));
-    azimuth.min(AZIMUTHS as i32 - 1) as u16
+    azimuth.clamp(0, AZIMUTHS as i32 - 1) as u16
 }
 
 /// A monotonic stand-in for how steeply a ray rises, from -1, straight down, to 1.

@@ -101,7 +101,7 @@ impl Sightlines {
             || {
                 let (mut batch, mut count) = (RayBatch::new(), 0);
                 for (n, placed) in placed.iter().enumerate() {
-                    let taken = is_kept(n, share) && placed.at[0].is_finite();
+                    let taken = is_kept(n, share) && placed.at.iter().all(|v| v.is_finite());
                     if taken && batch.push(paths.sensor_of(points, n), placed) {
                         count += self.count(&batch, &mut rays[count..]);
                         batch.len = 0;

@@ -158,7 +158,7 @@ impl ThinnedReturns {
         let mut taken = [0u32; MASK_WORDS];
         let mut dropped = 0;
         for Placed { at: p, offset_s } in returns {
-            let part = |v: f32| integer_part((v * scale).clamp(0.0, scale - 1.0)) as usize;
+            let part = |v: f32| integer_part((v * scale).clamp(0.0, scale - 1.0)).max(0) as usize;
             let height = detail.ground.above(column, p[2]);
             let level = integer_part(height * scale).max(0) as usize;
             let bit =

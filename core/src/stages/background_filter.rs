@@ -39,7 +39,7 @@ pub fn load(text: &str, levels: usize, table: &mut [i32]) -> Result<(), WeightsE
 }
 
 /// `bytes[b]` becomes the sum of `bits[n]` over the set bits `n` of `b`.
-pub fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
+fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
     bytes[0] = 0;
     for (n, bit) in bits.iter().enumerate() {
         let (without, with) = bytes[..2 << n].split_at_mut(1 << n);

@@ -124,7 +124,8 @@ pub fn occupancy_constancy(
     }
 }
 
-/// Lines of the grid that a source's targets lie on.
+/// Room for the lines of the grid that a source's targets lie on: a power of two, so that the
+/// remainder is right for lines before the grid, too.
 const LINES: usize = SIDE.next_power_of_two();
 /// Columns of such a line: those outside the grid on either side are unknown.
 const WIDTH: usize = SIDE_MAX + LINE;
@@ -134,6 +135,7 @@ const WIDTH: usize = SIDE_MAX + LINE;
 struct TargetLines {
     /// Line `n` of the grid is at `n % LINES`, its column `j` at `j + REACH`.
     masks: [[[u16; WIDTH]; 2]; LINES],
+    /// The lines that are held.
     held: Range<i32>,
 }
 
@@ -210,8 +212,11 @@ pub fn occupancy_constancy_by_lines(
     pair_cost: &mut [u16],
 ) {
     let side = sweep.side;
-    let unknown = (constancy_weights[3 * LEVELS_MAX] - sweep.score_min) as i16;
+    let unknown = constancy_weights[3 * LEVELS_MAX] - sweep.score_min;
+    assert!((0..SCORES_MAX as i32).contains(&unknown), "the least score is that of the weights");
+    let unknown = unknown as i16;
     let costs: &[u32; SCORES_MAX] = constancy_costs.first_chunk().expect("a cost of every score");
+    // Every score is within the table: the remainder only says so to the compiler.
     let cost_of = |score: i16| costs[score as u16 as usize % SCORES_MAX] as u16;
     let mut targets = TargetLines::NONE;
     for (&source, row) in foreground.iter().zip(pair_cost.as_chunks_mut::<ROW>().0) {

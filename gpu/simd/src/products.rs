@@ -1,6 +1,6 @@
-//! Sums of products of pairs, for several cells that share weights.
+//! Sums of products, for several cells that share weights.
 
-/// Written out; compilers vectorise it, but keep the sums in memory.
+/// For every instruction set. Vectorised by the compiler, which keeps the sums in memory.
 #[inline(always)]
 pub(crate) fn add_all<const IN: usize, const OUT: usize>(
     weights: &[[[i16; 2]; OUT]],
@@ -31,7 +31,8 @@ mod wide {
     /// Sums in a vector.
     const LANES: usize = 8;
 
-    /// The same with the sums of some cells in registers.
+    /// The same for AVX2, with the sums of some cells in registers: 6 to 12 of the 16 there are,
+    /// beside the inputs and a weight. Other numbers of cells were not measured.
     #[target_feature(enable = "avx2")]
     pub(crate) fn avx2<const IN: usize, const OUT: usize>(
         weights: &[[[i16; 2]; OUT]],
@@ -59,7 +60,7 @@ mod wide {
         let (inputs, inputs_left) = inputs.as_chunks::<CELLS>();
         let (sums, sums_left) = sums.as_chunks_mut::<CELLS>();
         for (inputs, sums) in inputs.iter().zip(sums) {
-            let mut of: [[__m256i; VECTORS]; CELLS] =
+            let mut totals: [[__m256i; VECTORS]; CELLS] =
                 from_fn(|c| from_fn(|v| load(&sums[c].as_chunks().0[v])));
             let inputs: [&[[i16; 2]]; CELLS] = from_fn(|c| inputs[c].as_chunks().0);
             for (p, weights) in weights.iter().enumerate() {
@@ -70,13 +71,14 @@ mod wide {
                 for (v, weights) in weights.as_chunks().0.iter().enumerate() {
                     let weights = load_pairs(weights);
                     for c in 0..CELLS {
-                        of[c][v] = _mm256_add_epi32(of[c][v], _mm256_madd_epi16(x[c], weights));
+                        let products = _mm256_madd_epi16(x[c], weights);
+                        totals[c][v] = _mm256_add_epi32(totals[c][v], products);
                     }
                 }
             }
-            for (of, sums) in of.iter().zip(sums) {
+            for (totals, sums) in totals.iter().zip(sums) {
                 let (sums, _) = sums.as_chunks_mut();
-                of.iter().zip(sums).for_each(|(of, sums)| store(*of, sums));
+                totals.iter().zip(sums).for_each(|(total, sums)| store(*total, sums));
             }
         }
         super::add_all(weights, inputs_left, sums_left);

@@ -14,6 +14,9 @@ fn odd_sweeps_give_valid_results() {
     for at in [[f32::NAN; 3], [f32::INFINITY; 3], [1e30, 5.0, 5.0], [5.0, 5.0, -1e30]] {
         nowhere.add(at, 0);
     }
+    // A place that overflowed in a column that was found before it did.
+    nowhere.add([f32::NAN, 20.5, GROUND + 1.0], 0);
+    *nowhere.columns.last_mut().unwrap() = column_of([20.5; 3]);
     let mut tall = Returns::flat();
     for n in 0..2000 {
         tall.add([20.5, 20.5 + 0.002 * n as f32, GROUND + n as f32], 1);

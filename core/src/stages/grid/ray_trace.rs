@@ -2,7 +2,7 @@
 
 use super::ray_merge::merged;
 use super::walk::Walk;
-use crate::params::{EXTENT_VOXELS, LOG_ODDS_FREE, LOG_ODDS_OCCUPIED, SIDE_MAX};
+use crate::params::{EXTENT_VOXELS, LOG_ODDS_FREE, LOG_ODDS_OCCUPIED, RANGE_STEPS_MAX, SIDE_MAX};
 use crate::record::{NO_END, Ray, SweepUniform, ray_end, ray_origin};
 
 /// Adds the updates of every entry of `distinct` to `log_odds` (tenths, one per voxel): each voxel
@@ -33,14 +33,16 @@ pub fn ray_trace(
 
 /// Number of rays looked up at once.
 const BATCH: usize = 64;
-/// Number of steps of a walk computed at once.
+/// Number of steps of a walk computed at once: those of a vector of AVX2. Not measured otherwise.
 const LANES: usize = 8;
 /// Bits of the part of a voxel that a walk has gone along an axis: as many as leave room for the
 /// voxels of [`LANES`] steps. They decide exactly where a voxel ends: those places are at least
 /// 1 / (2 length) of a voxel apart, and rounding adds up to less than that in a walk of fewer than
 /// 2^(PART_BITS - 1) / length steps.
 const PART_BITS: u32 = u32::BITS - LANES.ilog2() - 1;
-const _: () = assert!(SIDE_MAX as i64 * 4 * (EXTENT_VOXELS as i64) < 1 << (PART_BITS - 1));
+/// The longest walk that passes through the window: it starts at most [`RANGE_STEPS_MAX`] away.
+const LENGTH_MAX: i64 = EXTENT_VOXELS as i64 + RANGE_STEPS_MAX as i64 + SIDE_MAX as i64;
+const _: () = assert!(SIDE_MAX as i64 * LENGTH_MAX < 1 << (PART_BITS - 1));
 
 /// Adds the updates of a ray that counts `weight` times: those of [`Walk`], clipped to the window
 /// first and then walked by index.
@@ -197,17 +199,32 @@ mod tests {
         let mut rng = crate::random::Random(7);
         let mut draw =
             |least: i32, most: i32| least + rng.below((most - least + 1) as usize) as i32;
+        let mut long = 0;
         for n in 0..20_000 {
+            // Of every four, one in a large window, with ends as far as rays have them, one that
+            // starts far away as well, and two among few voxels.
+            let [side, reach, end_reach] = match n % 4 {
+                0 => [337, 400, EXTENT_VOXELS],
+                1 => [40, EXTENT_VOXELS, EXTENT_VOXELS],
+                _ => [40, 60, 60],
+            };
             let sweep = SweepUniform {
-                side: draw(1, 40),
+                side: draw(1, side),
                 levels: draw(1, 12),
-                range_steps: draw(1, 300),
+                range_steps: draw(1, if n % 4 == 0 { RANGE_STEPS_MAX } else { 300 }),
                 ..Default::default()
             };
-            // Every fourth one far away on all sides.
-            let reach = if n % 4 == 0 { 32_000 } else { 60 };
-            let mut place = || [0; 3].map(|_| draw(-reach, reach));
-            let (start, end) = (place(), place());
+            let mut start = [0; 3].map(|_| draw(-reach, reach));
+            let mut end = [0; 3].map(|_| draw(-end_reach, end_reach));
+            if n % 4 == 0 {
+                // Level enough to stay in the window for long; every other one along a diagonal or
+                // at a ratio of small numbers, where voxels are left through their edges.
+                (start[2], end[2]) = (draw(0, 11), draw(0, 11));
+                if n % 8 == 0 {
+                    let by = draw(1, 1000);
+                    end = [start[0] + by * draw(-3, 3), start[1] + by * draw(-3, 3), end[2]];
+                }
+            }
             let walk = Walk::new(start, end, sweep.range_steps);
             let wanted: Vec<usize> = walk.filter_map(|v| inside(&sweep, v)).collect();
             let line = WalkInWindow::new(&sweep, start, end);
@@ -215,7 +232,9 @@ mod tests {
             let mut found = Vec::new();
             line.walk(from, to, start, |index| found.push(index));
             assert_eq!(found, wanted, "{start:?} to {end:?} in {sweep:?}");
+            long += usize::from(found.len() > 100);
         }
+        assert!(long > 200, "{long}");
     }
 
     #[test]
