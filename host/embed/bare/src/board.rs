@@ -23,6 +23,16 @@ const SERIAL: *mut u32 = 0x0900_0000 as *mut u32;
 /// PSCI function that turns the machine off.
 const SYSTEM_OFF: u64 = 0x8400_0008;
 
+unsafe extern "C" {
+    /// The ends of the stack, as the linker places them.
+    static mut stack_bottom: u64;
+    static mut stack_top: u64;
+}
+/// What the stack is filled with, to see afterwards how much of it was used.
+const UNUSED: u64 = 0x5afe_5afe_5afe_5afe;
+/// Words of the stack in use while it is filled. A generous estimate.
+const IN_USE: usize = 512;
+
 static mut MEMORY: [MaybeUninit<u8>; super::BYTES] = [MaybeUninit::uninit(); super::BYTES];
 
 struct Serial;
@@ -41,9 +51,33 @@ impl Write for Serial {
 extern "C" fn start() -> ! {
     // SAFETY: this is called once, by one core, and nothing else refers to `MEMORY`.
     let memory = unsafe { &mut *(&raw mut MEMORY) };
+    fill_stack();
     // The serial port never fails.
     let _ = super::run(memory, &mut Serial);
+    let _ = writeln!(Serial, "stack      {} bytes", stack_used());
     off()
+}
+
+/// The words of the stack, from the lowest address.
+fn stack() -> (*mut u64, usize) {
+    let (bottom, top) = (&raw mut stack_bottom, &raw mut stack_top);
+    (bottom, (top as usize - bottom as usize) / size_of::<u64>())
+}
+
+fn fill_stack() {
+    let (bottom, words) = stack();
+    for n in 0..words - IN_USE {
+        // SAFETY: the stack grows downwards and has not come this far.
+        unsafe { bottom.add(n).write_volatile(UNUSED) };
+    }
+}
+
+/// Bytes of the stack that have been written since it was filled.
+fn stack_used() -> usize {
+    let (bottom, words) = stack();
+    // SAFETY: these are words of the stack; nobody else writes to them meanwhile.
+    let is_unused = |n: &usize| unsafe { bottom.add(*n).read_volatile() } == UNUSED;
+    (words - (0..words).take_while(is_unused).count()) * size_of::<u64>()
 }
 
 fn off() -> ! {
