@@ -44,7 +44,7 @@ impl<'a> WindowCosts<'a> {
     ) -> WindowCosts<'a> {
         let (rows_of_pairs, _) = pair_cost.as_chunks::<ROW>();
         let mut costs = WindowCosts { rows: heapless::Vec::new(), unknown: 0 };
-        for neighbour in neighbours(sweep, column as usize).into_iter().flatten() {
+        for neighbour in neighbours(sweep, column as usize) {
             match foreground_index[neighbour] {
                 NONE => costs.unknown += COST_UNKNOWN as u16,
                 n => {
@@ -125,20 +125,21 @@ fn lowest(line: &[u16]) -> u16 {
 }
 
 /// Cost of the window neighbours of a column that lie outside the grid.
+#[inline(always)]
 pub fn outside_cost(sweep: &SweepUniform, column: usize) -> i32 {
-    let missing = neighbours(sweep, column).iter().filter(|n| n.is_none()).count();
-    missing as i32 * sweep.outside_cost
+    let side = sweep.side;
+    let inside = |at: i32| 1 + i32::from(at > 0) + i32::from(at + 1 < side);
+    (9 - inside(column as i32 / side) * inside(column as i32 % side)) * sweep.outside_cost
 }
 
-/// The 3x3 columns around one, [`None`] outside the window.
-fn neighbours(sweep: &SweepUniform, column: usize) -> [Option<usize>; 9] {
+/// The 3x3 columns around one, as far as they are in the window.
+#[inline(always)]
+fn neighbours(sweep: &SweepUniform, column: usize) -> impl Iterator<Item = usize> {
     let side = sweep.side;
     let (i, j) = (column as i32 / side, column as i32 % side);
-    core::array::from_fn(|n| {
-        let (i, j) = (i + n as i32 / 3 - 1, j + n as i32 % 3 - 1);
-        let inside = (0..side).contains(&i) && (0..side).contains(&j);
-        inside.then_some((i * side + j) as usize)
-    })
+    let around = (0..9).map(move |n| (i + n / 3 - 1, j + n % 3 - 1));
+    let inside = around.filter(move |(i, j)| (0..side).contains(i) && (0..side).contains(j));
+    inside.map(move |(i, j)| (i * side + j) as usize)
 }
 
 #[cfg(test)]

@@ -112,6 +112,7 @@ struct Search<'a, C> {
 
 impl<C: Costs> Search<'_, C> {
     /// The best feasible candidate.
+    #[inline(always)]
     fn best(&self, around: &Sums, [energy, index]: MinCost) -> Option<Best> {
         let mut best = Best { energy: i32::MAX, index: i32::MAX };
         if around.count > 0 {
@@ -159,6 +160,7 @@ impl<C: Costs> Search<'_, C> {
     }
 
     /// Rings of growing distance around the mean of the neighbours' flows.
+    #[inline(always)]
     fn rings(&self, least: i32, around: &Sums, best: &mut Best) {
         let (n, [su, sv], smoothing) = (around.count, around.sum, self.sweep.smoothing);
         let mean = [round_div(su, n), round_div(sv, n)];
