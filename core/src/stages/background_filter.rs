@@ -66,10 +66,12 @@ fn score_by_bytes(
     columns: &[Column],
     column: usize,
 ) -> i32 {
+    // By patch column and byte: a byte needs no check that it is in its table.
+    let tables = filter_table.as_chunks::<256>().0.as_chunks::<4>().0;
     let mut sum = filter_table[FILTER_TABLE];
     each_of_patch(sweep, columns, column, |patch, masks| {
-        for (byte, value) in masks.to_le_bytes().into_iter().enumerate() {
-            sum += filter_table[table_at(patch, byte, value as usize)];
+        for (table, byte) in tables[patch].iter().zip(masks.to_le_bytes()) {
+            sum += table[byte as usize];
         }
     });
     sum
@@ -89,17 +91,14 @@ fn each_of_patch(
     column: usize,
     mut each: impl FnMut(usize, u32),
 ) {
-    const REACH: i32 = PATCH as i32 / 2;
-    let side = sweep.side;
-    let (i, j) = (column as i32 / side, column as i32 % side);
-    for di in -REACH..=REACH {
-        for dj in -REACH..=REACH {
-            let (ni, nj) = (i + di, j + dj);
-            if (0..side).contains(&ni) && (0..side).contains(&nj) {
-                let patch = (di + REACH) * PATCH as i32 + dj + REACH;
-                each(patch as usize, columns[(ni * side + nj) as usize][0]);
-            }
-        }
+    const REACH: usize = PATCH / 2;
+    let side = sweep.side as usize;
+    let (i, j) = (column / side, column % side);
+    let (first, last) = (j.saturating_sub(REACH), (j + REACH).min(side - 1));
+    for line in i.saturating_sub(REACH)..=(i + REACH).min(side - 1) {
+        let patch = (line + REACH - i) * PATCH + (first + REACH - j);
+        let columns = &columns[line * side + first..=line * side + last];
+        columns.iter().enumerate().for_each(|(n, [masks, _])| each(patch + n, *masks));
     }
 }
 
