@@ -125,9 +125,8 @@ impl EncoderWeights {
     ) {
         let (weights, biases, shifts) = self.layer::<TAPS, CHANNELS>(layer);
         let weights = weights.as_chunks().0.as_chunks().0;
-        let (mut sums, side) = ([[0; CHANNELS]; FINE], level.side);
+        let (mut sums, side) = ([*biases; FINE], level.side);
         let sums = &mut sums[..side];
-        sums.fill(*biases);
         for (tap, weights) in weights.iter().enumerate() {
             // Wraps below zero and is then outside the level, which is padded with zeros.
             let i = (row + tap).wrapping_sub(1);
