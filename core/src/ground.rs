@@ -7,6 +7,7 @@
 //!
 //! Parameters are in metres; positions and heights are in the caller's unit, the edge of a column.
 
+use crate::column_set::ColumnSet;
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
 use core::ops::Range;
 
@@ -62,8 +63,8 @@ pub struct GroundEstimator {
     extrapolated: [f32; CELLS_MAX],
     /// The lowest return of every column; infinite where it has none.
     low: [f32; COLUMNS_MAX],
-    /// Columns whose returns are too far apart vertically to be ground, one bit each.
-    thick: [u64; COLUMNS_MAX.div_ceil(64)],
+    /// Columns whose returns are too far apart vertically to be ground.
+    thick: ColumnSet,
 }
 
 impl Default for GroundEstimator {
@@ -83,7 +84,7 @@ impl GroundEstimator {
             height: [0.0; CELLS_MAX],
             extrapolated: [0.0; CELLS_MAX],
             low: [0.0; COLUMNS_MAX],
-            thick: [0; COLUMNS_MAX.div_ceil(64)],
+            thick: ColumnSet::new(),
         }
     }
 
@@ -139,32 +140,23 @@ impl GroundEstimator {
         self.find_thick(returns, thick);
         let [tolerance, slope] = [length(params.ground_tolerance_m), params.ground_slope];
         // Only thin columns whose lowest return is above their ground can be raised.
-        let mut raised = [0; COLUMNS_MAX.div_ceil(64)];
-        for (n, word) in raised[..(side * side).div_ceil(64)].iter_mut().enumerate() {
-            let columns = 64 * n..(64 * n + 64).min(side * side);
-            *word = !self.thick[n] & self.above(columns, tolerance, ground);
+        let mut above = ColumnSet::new();
+        for (c, (low, height)) in self.low[..side * side].iter().zip(&ground.0).enumerate() {
+            let is_above = (*low > *height + tolerance) & low.is_finite();
+            above.insert_if(c, is_above & !self.thick.contains(c));
         }
         for _ in 0..CLIMBS {
-            set_bits(&raised).for_each(|c| self.climb(side, c, slope, tolerance, ground));
-            set_bits(&raised).rev().for_each(|c| self.climb(side, c, slope, tolerance, ground));
+            above.iter().for_each(|c| self.climb(side, c, slope, tolerance, ground));
+            above.iter().rev().for_each(|c| self.climb(side, c, slope, tolerance, ground));
         }
     }
 
     /// Finds columns with returns that are higher than their lowest by an amount within `by`.
     fn find_thick(&mut self, returns: impl Iterator<Item = (usize, [f32; 3])>, by: Range<f32>) {
-        self.thick.fill(0);
+        self.thick.clear();
         for (column, [_, _, z]) in returns {
-            let bit = u64::from(by.contains(&(z - self.low[column])));
-            self.thick[column / 64] |= bit << (column % 64);
+            self.thick.insert_if(column, by.contains(&(z - self.low[column])));
         }
-    }
-
-    /// Columns, at most 64, whose lowest return is above their ground, one bit each.
-    fn above(&self, columns: Range<usize>, tolerance: f32, ground: &GroundHeights) -> u64 {
-        let pairs = self.low[columns.clone()].iter().zip(&ground.0[columns]);
-        pairs.enumerate().fold(0, |bits, (n, (low, height))| {
-            bits | u64::from((*low > *height + tolerance) & low.is_finite()) << n
-        })
     }
 
     /// Raises the ground of a thin column to its lowest return, if that is above it and the ground
@@ -177,7 +169,7 @@ impl GroundEstimator {
         tolerance: f32,
         ground: &mut GroundHeights,
     ) {
-        let is_thin = |c: usize| self.thick[c / 64] >> (c % 64) & 1 == 0;
+        let is_thin = |c: usize| !self.thick.contains(c);
         let low = self.low[column];
         if ground.0[column] == low {
             return;
@@ -224,10 +216,4 @@ impl GroundEstimator {
         }
         self.height[..n * n].copy_from_slice(&self.extrapolated[..n * n]);
     }
-}
-
-/// Indices of the bits that are set, ascending.
-fn set_bits(words: &[u64]) -> impl DoubleEndedIterator<Item = usize> {
-    let some = words.iter().enumerate().filter(|(_, word)| **word != 0);
-    some.flat_map(|(n, word)| (0..64).filter(move |b| word >> b & 1 != 0).map(move |b| 64 * n + b))
 }

@@ -27,6 +27,8 @@
 //!   [`mod@counters`], [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`],
 //!   [`plausible`], [`ctrv`].
 
+#[cfg(feature = "pipeline")]
+mod column_set;
 pub mod continuity;
 #[cfg(feature = "pipeline")]
 pub mod counters;

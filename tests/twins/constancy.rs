@@ -47,7 +47,7 @@ fn check_constancy(
         .buffer("columns_now", words(now))
         .buffer("pair_cost", cost.clone())
         .groups(&OCCUPANCY_CONSTANCY, foreground.len());
-    let halves = bytemuck::cast_slice_mut(&mut cost);
+    let halves: &mut [u16] = bytemuck::cast_slice_mut(&mut cost);
     raywake_core::stages::occupancy_constancy::occupancy_constancy(
         &step,
         &with.weights,
@@ -57,30 +57,19 @@ fn check_constancy(
         now,
         halves,
     );
-    check_lines(case, &step, with, foreground, [before, now], halves);
-    if let Some(outcome) = bench.run() {
-        outcome.check(&format!("{case}, {} rows", foreground.len()), &[("pair_cost", &cost)]);
-    }
-}
-
-/// What the scalar backend runs instead of the twin, for the list and the list reversed.
-fn check_lines(
-    case: &str,
-    step: &SweepUniform,
-    with: &Classifier,
-    foreground: &[u32],
-    [before, now]: [&[Column]; 2],
-    costs: &[u16],
-) {
+    // What the scalar backend runs instead, for the list and the list reversed.
     let mut sources = foreground.to_vec();
-    let mut wanted = costs[..foreground.len() * ROW].chunks(ROW).collect::<Vec<_>>();
+    let mut wanted: Vec<&[u16]> = halves.chunks(ROW).take(sources.len()).collect();
     for order in ["ascending", "descending"] {
-        let (weights, of_scores) = (&with.weights, &with.costs);
+        let (weights, costs) = (&with.weights, &with.costs);
         let mut found = vec![0; sources.len() * ROW];
-        occupancy_constancy_by_lines(step, weights, of_scores, &sources, before, now, &mut found);
+        occupancy_constancy_by_lines(&step, weights, costs, &sources, before, now, &mut found);
         assert!(found.chunks(ROW).eq(wanted.iter().copied()), "{case}, {order}");
         sources.reverse();
         wanted.reverse();
+    }
+    if let Some(outcome) = bench.run() {
+        outcome.check(&format!("{case}, {} rows", foreground.len()), &[("pair_cost", &cost)]);
     }
 }
 

@@ -26,7 +26,7 @@ impl<const OUT: usize> CellSums<'_, OUT> {
     fn activations(&self) -> [u8; OUT] {
         let mut activations = [0; OUT];
         for ((to, sum), shift) in activations.iter_mut().zip(self.sums).zip(self.shifts) {
-            *to = activation(*sum, 0, u32::from(*shift));
+            *to = activation(*sum, *shift);
         }
         activations
     }
@@ -61,17 +61,14 @@ impl EncoderWeights {
     #[inline(always)]
     fn column(&self, masks: u32) -> [u8; COLUMN_CHANNELS] {
         let bytes = masks.to_le_bytes();
-        let mut sums = [0; COLUMN_CHANNELS];
+        let (_, biases, shifts) = self.layer::<BITS, COLUMN_CHANNELS>(COLUMN);
+        let mut sums = *biases;
         for (table, byte) in self.bytes.iter().zip(bytes) {
             for (sum, of_byte) in sums.iter_mut().zip(&table[byte as usize]) {
                 *sum += i32::from(*of_byte);
             }
         }
-        let mut activations = [0; COLUMN_CHANNELS];
-        for n in 0..COLUMN_CHANNELS {
-            activations[n] = activation(sums[n], self.biases[n], u32::from(self.shifts[n]));
-        }
-        activations
+        CellSums { sums: &sums, shifts }.activations()
     }
 
     /// Weights, biases and shifts of a layer.

@@ -130,8 +130,8 @@ pub const TOTAL: [usize; 2] = before(LAYERS.len());
 /// per output, then a shift per output.
 pub const NUMBERS: usize = TOTAL[0] + 2 * TOTAL[1];
 
-/// The activation of a sum, its bias and its shift.
+/// The activation of a sum, its bias included, and its shift.
 #[inline(always)]
-pub fn activation(sum: i32, bias: i32, shift: u32) -> u8 {
-    ((sum + bias) >> shift).clamp(0, TOP) as u8
+pub fn activation(sum: i32, shift: u8) -> u8 {
+    (sum >> shift).clamp(0, TOP) as u8
 }

@@ -9,11 +9,12 @@
 //! Returns are only paired with returns of the same sensor. Two scanners see a dynamic object at
 //! different times; between two sweeps of one scanner it has moved for about one period.
 
-use super::cluster::{CloudPoints, Cluster, ColumnSet};
+use super::cluster::{CloudPoints, Cluster};
 use super::motion::{Motion, TARGETS_MAX};
 use super::sample::{Mean, SurfaceWeight, minus, squared_distance};
 use super::scaled::Scaled;
 use super::scans::Target;
+use crate::column_set::ColumnSet;
 use nalgebra::{Matrix3, Vector3};
 
 /// A cluster is registered with at most this many of the sweeps it is compared with: over a longer

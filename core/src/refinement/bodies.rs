@@ -1,11 +1,12 @@
 //! What goes with a moving cluster besides the columns that were found to move, and what does not.
 
-use super::cluster::{Cluster, ColumnSet};
+use super::cluster::Cluster;
 use super::clusters::{Clusters, is_moving, is_static};
 use super::cues::Prediction;
 use super::hypothesis::{self, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
+use crate::column_set::ColumnSet;
 use crate::record::NONE;
 
 /// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.

@@ -3,7 +3,7 @@
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean};
 use super::scans::{Scans, Target};
-use crate::params::COLUMNS_MAX;
+use crate::column_set::ColumnSet;
 
 /// Maximum number of a cluster's returns that are registered; up to as many of the second sweep
 /// are registered back. Bounds the time a cluster takes.
@@ -14,40 +14,6 @@ const TARGET_COLUMNS_MAX: usize = 1024;
 const HALF_MISSED: f32 = 0.5;
 
 pub type CloudPoints = heapless::Vec<CloudPoint, SAMPLES_MAX>;
-
-/// A set of columns, one bit each: small enough for the stack.
-pub struct ColumnSet([u64; COLUMNS_MAX.div_ceil(64)]);
-
-impl ColumnSet {
-    pub fn new() -> ColumnSet {
-        ColumnSet([0; COLUMNS_MAX.div_ceil(64)])
-    }
-
-    /// Adds a column. Returns whether it was new.
-    pub fn insert(&mut self, column: usize) -> bool {
-        let (word, bit) = (&mut self.0[column / 64], 1 << (column % 64));
-        let first = *word & bit == 0;
-        *word |= bit;
-        first
-    }
-
-    /// Whether a column is in it.
-    pub fn contains(&self, column: usize) -> bool {
-        self.0[column / 64] >> (column % 64) & 1 != 0
-    }
-
-    /// Its columns, ascending.
-    pub fn iter(&self) -> impl Iterator<Item = usize> {
-        let some = self.0.iter().enumerate().filter(|(_, word)| **word != 0);
-        some.flat_map(|(n, word)| {
-            (0..64).filter(move |b| word >> b & 1 != 0).map(move |b| 64 * n + b)
-        })
-    }
-
-    fn remove(&mut self, columns: &[u32]) {
-        columns.iter().for_each(|c| self.0[*c as usize / 64] &= !(1 << (c % 64)));
-    }
-}
 
 /// Residuals in one sweep, of the returns that can be seen there.
 #[derive(Clone, Copy)]

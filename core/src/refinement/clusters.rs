@@ -1,12 +1,13 @@
 //! The clusters of a pair's first sweep: columns that touch, then their moving parts, then what
 //! goes with those (`bodies.rs`).
 
-use super::cluster::{Cluster, ColumnSet};
+use super::cluster::Cluster;
 use super::cues::{ColumnCues, Cues, Looks, Prediction};
 use super::hypothesis::{self, Hypothesis};
 use super::motion::Motion;
 use super::scans::Scans;
 use super::segments::{Segments, agree};
+use crate::column_set::ColumnSet;
 use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill, share};
@@ -20,8 +21,8 @@ pub struct Clusters {
     column_cues: [ColumnCues; COLUMNS_MAX],
     /// Number of columns in clusters that there was no room for.
     pub beyond: usize,
-    /// Columns that may be part of something that moves, one bit each.
-    suspects: [u64; COLUMNS_MAX.div_ceil(64)],
+    /// Columns that may be part of something that moves.
+    suspects: ColumnSet,
 }
 
 impl Clusters {
@@ -32,7 +33,7 @@ impl Clusters {
             found: heapless::Vec::new(),
             column_cues: [ColumnCues::NONE; COLUMNS_MAX],
             beyond: 0,
-            suspects: [0; COLUMNS_MAX.div_ceil(64)],
+            suspects: ColumnSet::new(),
         }
     }
 
@@ -153,12 +154,12 @@ impl Clusters {
     ) {
         let suspect = |c: usize| is_static(&self.of_column, &self.found, c) && suspect(c);
         let columns = scans.first.side * scans.first.side;
-        fill(team, 0, &mut self.suspects[..columns.div_ceil(64)], &|word| {
+        fill(team, 0, &mut self.suspects.words()[..columns.div_ceil(64)], &|word| {
             let bits = (64 * word..columns.min(64 * (word + 1))).enumerate();
             bits.fold(0, |bits, (n, c)| bits | u64::from(suspect(c)) << n)
         });
         let suspects = &self.suspects;
-        self.segments.find(&scans, |c| suspects[c / 64] >> (c % 64) & 1 != 0, |_, _| true);
+        self.segments.find(&scans, |c| suspects.contains(c), |_, _| true);
         let whole = self.found.len();
         self.test_segments(team, scans, flow, predicted);
         let parts = &mut self.found[whole..];

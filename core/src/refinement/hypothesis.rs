@@ -6,7 +6,7 @@
 //! (`evidence_prior_ratio` of [`RefinementParams`](crate::params::RefinementParams)), and even less
 //! if it is long.
 
-use super::cluster::{Cluster, ColumnSet};
+use super::cluster::Cluster;
 use super::cues::{Cues, Looks, Prediction, Prior};
 use super::footprint::Footprint;
 use super::motion::Motion;
@@ -15,6 +15,7 @@ use super::scans::Scans;
 use super::search::search;
 use super::slide::slide;
 use super::starts::{TRAFFIC_MAX, Votes};
+use crate::column_set::ColumnSet;
 use crate::record::{Flow, VALID, flow_displacement};
 
 /// Number of displacements many columns voted for that are tried as starts. Limited to save time:

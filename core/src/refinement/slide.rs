@@ -5,8 +5,9 @@
 //! but returns beyond the ends of what the other sweep shows are missed. This tries displacements
 //! along the direction that registration knows least about.
 
-use super::cluster::{Cluster, ColumnSet};
+use super::cluster::Cluster;
 use super::motion::Motion;
+use crate::column_set::ColumnSet;
 
 /// Number of displacements tried either way, and their spacing, voxels: 4.8 m in steps of 0.3 m.
 /// Then those next to the best are tried at half the spacing, and again: 37 residuals. With half a

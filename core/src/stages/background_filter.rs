@@ -50,10 +50,10 @@ fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
 /// Score of a column (3.6) times the scale of the weights: the bias plus the weight of every free
 /// and every occupied voxel of the 5x5 columns around it. Columns outside the window are unknown.
 pub fn score(sweep: &SweepUniform, filter_table: &[i32], columns: &[Column], column: usize) -> i32 {
-    let mut sum = filter_table[FILTER_TABLE];
+    let (tables, mut sum) = tables(filter_table);
     each_of_patch(sweep, columns, column, |patch, masks| {
         for bit in (0..32).filter(|bit| masks >> bit & 1 == 1) {
-            sum += filter_table[table_at(patch, bit / 8, 1 << (bit % 8))];
+            sum += tables[patch][bit / 8][1 << (bit % 8)];
         }
     });
     sum
@@ -66,9 +66,7 @@ fn score_by_bytes(
     columns: &[Column],
     column: usize,
 ) -> i32 {
-    // By patch column and byte: a byte needs no check that it is in its table.
-    let tables = filter_table.as_chunks::<256>().0.as_chunks::<4>().0;
-    let mut sum = filter_table[FILTER_TABLE];
+    let (tables, mut sum) = tables(filter_table);
     each_of_patch(sweep, columns, column, |patch, masks| {
         for (table, byte) in tables[patch].iter().zip(masks.to_le_bytes()) {
             sum += table[byte as usize];
@@ -77,10 +75,10 @@ fn score_by_bytes(
     sum
 }
 
-/// Table index of a value of a byte of a patch column's masks.
+/// The tables of every patch column, one for each byte of its masks, and the bias.
 #[inline]
-fn table_at(patch: usize, byte: usize, value: usize) -> usize {
-    (patch * 4 + byte) * 256 + value
+fn tables(filter_table: &[i32]) -> (&[[[i32; 256]; 4]], i32) {
+    (filter_table.as_chunks().0.as_chunks().0, filter_table[FILTER_TABLE])
 }
 
 /// Calls `each` with the position in the patch and the masks of its columns that are in the window.

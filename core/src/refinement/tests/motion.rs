@@ -1,9 +1,10 @@
 //! Clusters with known motion.
 
-use super::super::cluster::{Cluster, ColumnSet};
+use super::super::cluster::Cluster;
 use super::super::hypothesis::{self, Hypothesis};
 use super::super::motion::Motion;
 use super::*;
+use crate::column_set::ColumnSet;
 
 /// What is found about a car that moves steadily, over some sweeps: the number of its columns that
 /// move, and the median and the largest error of their motion, voxels.

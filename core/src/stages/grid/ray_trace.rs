@@ -204,7 +204,7 @@ mod tests {
             // Of every four, one in a large window, with ends as far as rays have them, one that
             // starts far away as well, and two among few voxels.
             let [side, reach, end_reach] = match n % 4 {
-                0 => [337, 400, EXTENT_VOXELS],
+                0 => [SIDE_MAX as i32, 400, EXTENT_VOXELS],
                 1 => [40, EXTENT_VOXELS, EXTENT_VOXELS],
                 _ => [40, 60, 60],
             };
