@@ -6,7 +6,7 @@ use super::cues::Prediction;
 use super::hypothesis::{self, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
-use crate::column_set::ColumnSet;
+use crate::column_set::{ColumnSet, around};
 use crate::record::NONE;
 
 /// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.
@@ -17,20 +17,28 @@ impl Clusters {
     /// go with these if they fit. Without evidence of their own they must not have been there
     /// before (`worn_max`).
     pub(super) fn absorb_fragments(&mut self, scans: Scans) {
+        let (side, reach) = (scans.first.side, scans.scaled.fragment_distance);
         let visited = &mut ColumnSet::new();
+        // Most static columns are far from anything that moves.
+        let mut beside = ColumnSet::new();
+        let moving = (0..side * side).filter(|c| is_moving(&self.of_column, &self.found, *c));
+        moving.flat_map(|c| around(c, reach, side)).for_each(|c| beside.insert_if(c, true));
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
-            let near = self.moving_neighbours(scans, columns, scans.scaled.fragment_distance);
-            if near.is_empty() {
+            if !columns.iter().any(|c| beside.contains(*c as usize)) {
                 continue;
             }
+            let near = self.moving_neighbours(scans, columns, reach);
             let cluster = Cluster::new(scans, columns);
             if cluster.extent > scans.scaled.extent_max {
                 continue;
             }
             if let Some(with) = self.joined(&cluster, &near, visited) {
-                columns.iter().for_each(|c| self.of_column[*c as usize] = with);
+                for c in columns.iter().map(|c| *c as usize) {
+                    self.of_column[c] = with;
+                    around(c, reach, side).for_each(|c| beside.insert_if(c, true));
+                }
             }
         }
     }
@@ -176,7 +184,9 @@ impl Clusters {
         let mut best = (1.0, None);
         for m in near {
             let found = &self.found[*m as usize];
-            let residual = fragment.residual(&found.motion, visited);
+            let Some(residual) = fragment.residual_below(best.0, &found.motion, visited) else {
+                continue;
+            };
             let is_remainder = found.parent == parent && found.extent > extent_min;
             let hidden = visible < params.visible_ratio && residual < params.residual_bad;
             let worn = || self.worn(&fragment.scans, fragment.columns, &found.motion);
@@ -184,7 +194,7 @@ impl Clusters {
                 > params.evidence_min * params.evidence_prior_ratio
                 || (hidden || is_remainder && residual < rest + params.remainder_residual)
                     && worn() <= params.worn_max;
-            if joins && residual < best.0 {
+            if joins {
                 best = (residual, Some(*m));
             }
         }
@@ -200,17 +210,11 @@ impl Clusters {
     ) -> heapless::Vec<u32, NEIGHBOURS_MAX> {
         let side = scans.first.side;
         let mut near = heapless::Vec::new();
-        for &c in columns {
-            let (i, j) = (c as usize / side, c as usize % side);
-            for a in i.saturating_sub(reach)..(i + reach + 1).min(side) {
-                for b in j.saturating_sub(reach)..(j + reach + 1).min(side) {
-                    let other = self.of_column[a * side + b];
-                    let moves = is_moving(&self.of_column, &self.found, a * side + b);
-                    if moves && !near.contains(&other) {
-                        // Beyond the capacity: the first ones are enough.
-                        let _ = near.push(other);
-                    }
-                }
+        for c in columns.iter().flat_map(|c| around(*c as usize, reach, side)) {
+            let other = self.of_column[c];
+            if is_moving(&self.of_column, &self.found, c) && !near.contains(&other) {
+                // Beyond the capacity: the first ones are enough.
+                let _ = near.push(other);
             }
         }
         near

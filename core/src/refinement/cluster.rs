@@ -113,17 +113,33 @@ impl<'a> Cluster<'a> {
     /// Mean truncated residual of a motion, both ways: 0 (all returns lie on something) to 1 (none
     /// does). A return that ends up where nothing can be seen counts as missed, unless the cluster
     /// could move and most of it is seen in the second sweep: behind a corner anything fits.
-    pub fn residual(&self, motion: &Motion, visited: &mut ColumnSet) -> f32 {
-        if self.could_move {
-            let (residual, visible) = self.seen_residual(motion, visited);
-            if visible > self.scans.scaled.params.visible_ratio {
-                return residual;
+    /// `None` if it is not below `limit`; what cannot be is not summed to the end.
+    pub fn residual_below(
+        &self,
+        limit: f32,
+        motion: &Motion,
+        visited: &mut ColumnSet,
+    ) -> Option<f32> {
+        let targets = self.scans.targets;
+        let second = self.could_move.then(|| self.seen_in(&targets[0], motion));
+        let second = second.filter(|second| self.is_majority(second.visible));
+        let mut mean = Mean::default();
+        for (target, left) in targets.iter().zip((0..targets.len()).rev()) {
+            mean.include(match second {
+                Some(second) if target.index == 0 => second.mean,
+                Some(_) => self.seen_in(target, motion).mean,
+                None => self.all_in(target, motion),
+            });
+            // Everything that is still to come may fit.
+            if mean.value_with((left * (self.samples.len() + 1) + SAMPLES_MAX) as f32) >= limit {
+                return None;
             }
         }
-        let mut mean = Mean::default();
-        self.scans.targets.iter().for_each(|t| mean.include(self.all_in(t, motion)));
-        self.add_all_backward(&mut mean, motion, visited);
-        mean.value()
+        match second {
+            Some(_) => self.add_seen_backward(&mut mean, motion, visited),
+            None => self.add_all_backward(&mut mean, motion, visited),
+        }
+        Some(mean.value()).filter(|residual| *residual < limit)
     }
 
     /// Residuals of a motion in one sweep.

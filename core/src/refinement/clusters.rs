@@ -7,7 +7,7 @@ use super::hypothesis::{self, Hypothesis};
 use super::motion::Motion;
 use super::scans::Scans;
 use super::segments::{Segments, agree};
-use crate::column_set::ColumnSet;
+use crate::column_set::{ColumnSet, around};
 use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill, share};
@@ -239,16 +239,11 @@ fn grow(
     };
     // Given only in the end: looks leave out where the part alone was, in whatever order.
     let mut given = ColumnSet::new();
-    for (i, j) in columns.iter().map(|c| (*c as usize / side, *c as usize % side)) {
-        for a in i.saturating_sub(1)..(i + 2).min(side) {
-            for b in j.saturating_sub(1)..(j + 2).min(side) {
-                let beside = a * side + b;
-                let worn = |c| scans.worn(&[c as u32], motion, |c| of_column[c] == part);
-                let open = of_column[beside] == parent && !given.contains(beside);
-                if open && fits(beside) && worn(beside) <= worn_max {
-                    given.insert(beside);
-                }
-            }
+    for beside in columns.iter().flat_map(|c| around(*c as usize, 1, side)) {
+        let worn = |c| scans.worn(&[c as u32], motion, |c| of_column[c] == part);
+        let open = of_column[beside] == parent && !given.contains(beside);
+        if open && fits(beside) && worn(beside) <= worn_max {
+            given.insert(beside);
         }
     }
     given.iter().for_each(|c| of_column[c] = part);

@@ -122,7 +122,7 @@ impl Trials<'_> {
         let _ = self.tried.push(by);
         let start = Motion::around(cluster.centre).displaced(by);
         let motion = cluster.align(start, scaled.params.start_stride as usize, self.visited);
-        if cluster.residual(&motion, self.visited) < self.residual {
+        if cluster.residual_below(self.residual, &motion, self.visited).is_some() {
             let motion = cluster.align(motion, 1, self.visited);
             self.consider(motion);
         }
@@ -130,8 +130,8 @@ impl Trials<'_> {
 
     /// Takes a motion if it fits better than the best so far.
     fn consider(&mut self, motion: Motion) {
-        let residual = self.cluster.residual(&motion, self.visited);
-        if residual < self.residual {
+        let better = self.cluster.residual_below(self.residual, &motion, self.visited);
+        if let Some(residual) = better {
             (self.residual, self.motion) = (residual, motion);
         }
     }

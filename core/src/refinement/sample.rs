@@ -58,6 +58,11 @@ impl Mean {
     }
 
     pub fn value(&self) -> f32 {
-        self.sum / self.count.max(1.0)
+        self.value_with(0.0)
+    }
+
+    /// The mean once this many zeros have been added.
+    pub fn value_with(&self, zeros: f32) -> f32 {
+        self.sum / (self.count + zeros).max(1.0)
     }
 }

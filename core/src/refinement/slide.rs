@@ -37,8 +37,7 @@ pub fn slide(
     let slid = |by: f32| motion.displaced(direction.map(|d| by * d));
     let mut best = (residual - GAIN, None);
     let mut attempt = |by: f32, best: &mut (f32, Option<f32>)| {
-        let residual = cluster.residual(&slid(by), visited);
-        if residual < best.0 {
+        if let Some(residual) = cluster.residual_below(best.0, &slid(by), visited) {
             *best = (residual, Some(by));
         }
     };

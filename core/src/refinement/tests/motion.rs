@@ -247,6 +247,16 @@ fn columns_with_returns(cloud: DetailedCloud) -> Vec<u32> {
     (0..(SIDE * SIDE) as u32).filter(|c| cloud.levels(*c as usize) != 0).collect()
 }
 
+/// The residual of a motion, whatever the limit.
+fn residual_of(cluster: &Cluster, motion: &Motion) -> f32 {
+    let residual = |limit| cluster.residual_below(limit, motion, &mut ColumnSet::new());
+    let whole = residual(f32::INFINITY).unwrap();
+    for limit in [0.01, 0.1, 0.5 * whole, whole, 1.01 * whole] {
+        assert_eq!(residual(limit), Some(whole).filter(|r| *r < limit), "{limit}");
+    }
+    whole
+}
+
 #[test]
 fn potential_movers_may_go_where_nothing_is_seen() {
     let mut random = Random(10);
@@ -273,7 +283,7 @@ fn potential_movers_may_go_where_nothing_is_seen() {
     };
     let residual = |cluster: Cluster| {
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
-        cluster.residual(&motion, &mut ColumnSet::new())
+        residual_of(&cluster, &motion)
     };
     let [unknown, known] = [cluster(&[]), cluster(&could)].map(residual);
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
@@ -305,7 +315,6 @@ fn objects_entering_the_window_were_outside() {
         history: &NO_HISTORY,
     };
     let cluster = Cluster::new(scans, &part);
-    let motion = Motion::around(cluster.centre).displaced([-8.0, 0.0]);
-    let residual = cluster.residual(&motion, &mut ColumnSet::new());
-    assert!(residual < 0.05, "{residual}");
+    let moved = |by| residual_of(&cluster, &Motion::around(cluster.centre).displaced([by, 0.0]));
+    assert!(moved(-8.0) < 0.05 && moved(-7.0) > 0.1, "{} {}", moved(-8.0), moved(-7.0));
 }
