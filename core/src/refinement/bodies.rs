@@ -84,13 +84,14 @@ impl Clusters {
     /// learned may still move.
     pub(super) fn drop_immovable(&mut self, scans: Scans) {
         self.found.iter_mut().for_each(|f| f.similarity = 0);
-        for c in 0..self.of_column.len() {
+        let columns = scans.first.side * scans.first.side;
+        for c in 0..columns {
             let found = self.found.get_mut(self.of_column[c] as usize);
             if let Some(found) = found.filter(|f| f.is_dynamic) {
                 found.similarity += if scans.stays(c) { -1 } else { 1 };
             }
         }
-        for c in 0..self.of_column.len() {
+        for c in 0..columns {
             let found = self.found.get(self.of_column[c] as usize);
             if found.is_some_and(|f| f.is_dynamic && !f.may_include(&scans, c)) {
                 self.of_column[c] = NONE;
@@ -133,9 +134,10 @@ impl Clusters {
             return false;
         }
         let [rest, moved] = Cluster::new(*scans, columns).own_residuals(motion);
-        let mut of_cluster = self.of_column.iter().enumerate().filter(|(_, of)| **of == id);
+        let side = scans.first.side;
+        let mut of_cluster = (0..side * side).filter(|c| self.of_column[*c] == id);
         evidence(rest, moved) <= scans.scaled.params.evidence_min
-            && of_cluster.any(|(c, _)| scans.could_move(c) > 0.0)
+            && of_cluster.any(|c| scans.could_move(c) > 0.0)
     }
 
     /// Share of looks at columns that hit something else, had they moved like this
