@@ -62,7 +62,7 @@ impl Clusters {
                 continue;
             }
             let rest = Cluster::new(scans, columns);
-            let static_residual = rest.static_residual(None, visited).0;
+            let static_residual = rest.seen_at_rest(None, visited).value();
             let with = near.iter().filter_map(|m| {
                 let body = &self.found[*m as usize];
                 let with =
@@ -180,7 +180,8 @@ impl Clusters {
     /// Which of the nearby moving clusters a fragment goes with.
     fn joined(&self, fragment: &Cluster, near: &[u32], visited: &mut ColumnSet) -> Option<u32> {
         let params = &fragment.scans.scaled.params;
-        let (rest, visible) = fragment.static_residual(None, visited);
+        let at_rest = fragment.seen_at_rest(None, visited);
+        let (rest, visible) = (at_rest.value(), at_rest.visible());
         let parent = self.of_column[fragment.columns[0] as usize];
         let extent_min = params.remainder_ratio * self.found[parent as usize].extent;
         let mut best = (1.0, None);

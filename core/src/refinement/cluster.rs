@@ -1,6 +1,6 @@
 //! A cluster and how well a motion explains its returns.
 
-use super::motion::Motion;
+use super::motion::{Motion, TARGETS_MAX};
 use super::sample::{CloudPoint, Mean};
 use super::scans::{Scans, Target};
 use crate::column_set::ColumnSet;
@@ -21,6 +21,34 @@ pub struct SeenResidual {
     mean: Mean,
     /// Share of the returns that can be seen.
     visible: f32,
+}
+
+/// The same in every sweep, and of the returns of the second sweep that lie where the cluster would
+/// be: those that can be seen in the first.
+pub struct SeenResiduals {
+    in_sweeps: heapless::Vec<SeenResidual, TARGETS_MAX>,
+    backward: heapless::Vec<f32, SAMPLES_MAX>,
+}
+
+impl SeenResiduals {
+    /// Their mean, 0 if there are none.
+    pub fn value(&self) -> f32 {
+        self.value_in(|_| true)
+    }
+
+    /// The same without the sweeps that are not `wanted`.
+    fn value_in(&self, wanted: impl Fn(usize) -> bool) -> f32 {
+        let mut mean = Mean::default();
+        let in_sweeps = self.in_sweeps.iter().enumerate().filter(|(n, _)| wanted(*n));
+        in_sweeps.for_each(|(_, seen)| mean.include(seen.mean));
+        self.backward.iter().for_each(|m| mean.add(*m));
+        mean.value()
+    }
+
+    /// The share of the cluster's returns that can be seen in the second sweep.
+    pub fn visible(&self) -> f32 {
+        self.in_sweeps[0].visible
+    }
 }
 
 /// A cluster: its columns, some of its returns, and what they are registered with.
@@ -136,7 +164,7 @@ impl<'a> Cluster<'a> {
             }
         }
         match second {
-            Some(_) => self.add_seen_backward(&mut mean, motion, visited),
+            Some(_) => self.seen_backward(motion, visited).for_each(|m| mean.add(m)),
             None => self.add_all_backward(&mut mean, motion, visited),
         }
         Some(mean.value()).filter(|residual| *residual < limit)
@@ -186,40 +214,30 @@ impl<'a> Cluster<'a> {
         }
     }
 
-    /// The same from the returns that can be seen.
-    fn add_seen_backward(&self, mean: &mut Mean, motion: &Motion, visited: &mut ColumnSet) {
+    /// Residuals of the second sweep's returns in the first, of those that can be seen.
+    fn seen_backward(&self, motion: &Motion, visited: &mut ColumnSet) -> impl Iterator<Item = f32> {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
-        for q in &self.target_samples(motion, visited) {
-            let at = target.retrace(q, motion);
-            if let Some(decisive) = scans.decisive_residual(scans.second(), q, &scans.first, at) {
-                mean.add(decisive);
-            }
-        }
+        self.target_samples(motion, visited).into_iter().filter_map(move |q| {
+            let at = target.retrace(&q, motion);
+            scans.decisive_residual(scans.second(), &q, &scans.first, at)
+        })
     }
 
-    /// [`Cluster::seen_residual`] at rest. `in_earliest` is [`Cluster::seen_in_earliest`], if that
-    /// is known.
-    pub fn static_residual(
+    /// [`Cluster::seen`] at rest. `in_earliest` is [`Cluster::seen_in_earliest`], if that is known.
+    pub fn seen_at_rest(
         &self,
         in_earliest: Option<SeenResidual>,
         visited: &mut ColumnSet,
-    ) -> (f32, f32) {
-        self.residual_after(in_earliest, &Motion::around(self.centre), visited)
+    ) -> SeenResiduals {
+        self.seen_after(in_earliest, &Motion::around(self.centre), visited)
     }
 
-    /// The residual at rest to compare with that of a motion. It leaves out the sweeps that show
-    /// little of where the cluster would have been: they may show all of it at rest, and would then
-    /// contribute to that residual only.
-    pub fn compared_residual(&self, motion: &Motion, visited: &mut ColumnSet) -> f32 {
-        let rest = Motion::around(self.centre);
-        let mut mean = Mean::default();
-        for target in self.scans.targets {
-            if self.is_majority(self.seen_in(target, motion).visible) {
-                mean.include(self.seen_in(target, &rest).mean);
-            }
-        }
-        self.add_seen_backward(&mut mean, &rest, visited);
-        mean.value()
+    /// The residual at rest to compare with that of a motion, given all of those at rest. It leaves
+    /// out the sweeps that show little of where the cluster would have been: they may show all of
+    /// it at rest, and would then contribute to that residual only.
+    pub fn compared_residual(&self, at_rest: &SeenResiduals, motion: &Motion) -> f32 {
+        let targets = self.scans.targets;
+        at_rest.value_in(|n| self.is_majority(self.seen_in(&targets[n], motion).visible))
     }
 
     /// The residuals at rest and of a motion, over its returns that can be seen in the other sweeps
@@ -255,32 +273,25 @@ impl<'a> Cluster<'a> {
         self.is_majority(in_earliest.visible).then(|| in_earliest.mean.value())
     }
 
-    /// The residual of a motion over the returns that can be seen, 0 if none can, and the share of
-    /// its returns that can be seen in the second sweep.
-    pub fn seen_residual(&self, motion: &Motion, visited: &mut ColumnSet) -> (f32, f32) {
-        self.residual_after(None, motion, visited)
+    /// The residuals of a motion over the returns that can be seen.
+    pub fn seen(&self, motion: &Motion, visited: &mut ColumnSet) -> SeenResiduals {
+        self.seen_after(None, motion, visited)
     }
 
     /// The same if the residuals in the earliest sweep may already be known.
-    fn residual_after(
+    fn seen_after(
         &self,
         earliest: Option<SeenResidual>,
         motion: &Motion,
         visited: &mut ColumnSet,
-    ) -> (f32, f32) {
-        let mut mean = Mean::default();
-        let mut visible = 0.0;
+    ) -> SeenResiduals {
         let targets = self.scans.targets;
-        for target in targets {
+        let in_sweeps = targets.iter().map(|target| {
             let in_earliest = earliest.filter(|_| target.index + 1 == targets.len());
-            let seen = in_earliest.unwrap_or_else(|| self.seen_in(target, motion));
-            mean.include(seen.mean);
-            if target.index == 0 {
-                visible = seen.visible;
-            }
-        }
-        self.add_seen_backward(&mut mean, motion, visited);
-        (mean.value(), visible)
+            in_earliest.unwrap_or_else(|| self.seen_in(target, motion))
+        });
+        let in_sweeps = in_sweeps.collect();
+        SeenResiduals { in_sweeps, backward: self.seen_backward(motion, visited).collect() }
     }
 
     /// Whether something was already where a return of the second sweep is.

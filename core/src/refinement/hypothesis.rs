@@ -110,7 +110,13 @@ struct Trials<'a> {
     motion: Motion,
 }
 
-impl Trials<'_> {
+impl<'a> Trials<'a> {
+    /// Nothing tried yet: rest, with this residual.
+    fn new(cluster: &'a Cluster<'a>, residual: f32, visited: &'a mut ColumnSet) -> Trials<'a> {
+        let motion = Motion::around(cluster.centre);
+        Trials { cluster, visited, tried: heapless::Vec::new(), residual, motion }
+    }
+
     /// Registers the cluster from a start, with few returns, then with all of them if that leads to
     /// a better fit than the best so far.
     fn start(&mut self, by: [f32; 2]) {
@@ -138,8 +144,9 @@ impl Trials<'_> {
 
     /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search; then,
     /// if it moves, how traffic moves: in a row of cars each may fit the next one about as well. It
-    /// then slides the cluster along itself from the best of these.
-    fn run(&mut self, predicted: Option<[f32; 2]>, flow: impl Fn(usize) -> Flow) {
+    /// then slides the cluster along itself from the best of these. Returns the best motion and its
+    /// residual.
+    fn run(mut self, predicted: Option<[f32; 2]>, flow: impl Fn(usize) -> Flow) -> (Motion, f32) {
         let cluster = self.cluster;
         let params = &cluster.scans.scaled.params;
         let static_residual = self.residual;
@@ -172,6 +179,7 @@ impl Trials<'_> {
             let motion = cluster.align(slid, 1, self.visited);
             self.consider(motion);
         }
+        (self.motion, self.residual)
     }
 }
 
@@ -205,11 +213,14 @@ pub fn test(
         return at_rest(cluster.second_residual());
     }
     let in_earliest = cluster.seen_in_earliest();
-    let standing = in_earliest.and_then(|seen| cluster.residual_at_rest(seen));
-    let standing = standing
-        .filter(|residual| prior.by.is_none() && *residual < STATIC_RATIO * params.residual_static);
-    let static_residual =
-        standing.unwrap_or_else(|| cluster.static_residual(in_earliest, visited).0);
+    if prior.by.is_none()
+        && let Some(residual) = in_earliest.and_then(|seen| cluster.residual_at_rest(seen))
+        && residual < STATIC_RATIO * params.residual_static
+    {
+        return at_rest(residual);
+    }
+    let seen_at_rest = cluster.seen_at_rest(in_earliest, visited);
+    let static_residual = seen_at_rest.value();
     let prior_ratio =
         params.evidence_prior_ratio * (scaled.evidence_length / cluster.extent).min(1.0);
     let prior_ratio = 1.0 - prior.share * (1.0 - prior_ratio);
@@ -217,14 +228,10 @@ pub fn test(
     if static_residual < params.residual_static * ease {
         return at_rest(static_residual);
     }
-    let tried = heapless::Vec::new();
-    let motion = Motion::around(cluster.centre);
-    let mut trials = Trials { cluster, visited, tried, residual: static_residual, motion };
-    trials.run(prior.by, flow);
-    let Trials { residual, motion, visited, .. } = trials;
+    let (motion, residual) = Trials::new(cluster, static_residual, visited).run(prior.by, flow);
     // For all others, returns that are not seen count as missed.
     let static_residual = if cluster.could_move {
-        cluster.compared_residual(&motion, visited)
+        cluster.compared_residual(&seen_at_rest, &motion)
     } else {
         static_residual
     };
@@ -256,7 +263,7 @@ pub fn along_with(
 ) -> Option<Hypothesis> {
     let scaled = rest.scans.scaled;
     let motion = rest.align(body.motion.about(rest.centre), 1, visited);
-    let residual = rest.seen_residual(&motion, visited).0;
+    let residual = rest.seen(&motion, visited).value();
     let fits = residual < static_residual + scaled.params.remainder_residual
         && motion.is_near(&body.motion, scaled.start_spacing);
     fits.then(|| Hypothesis {
