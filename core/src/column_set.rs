@@ -2,8 +2,9 @@
 
 use crate::params::COLUMNS_MAX;
 
-/// The columns of a square window of `side` columns within `reach` of one, along either axis.
-pub fn around(column: usize, reach: usize, side: usize) -> impl Iterator<Item = usize> {
+/// The columns at most `reach` from a column along each axis, itself included, in a window of
+/// `side` by `side`; ascending.
+pub fn columns_near(column: usize, reach: usize, side: usize) -> impl Iterator<Item = usize> {
     let near = move |at: usize| at.saturating_sub(reach)..(at + reach + 1).min(side);
     near(column / side).flat_map(move |i| near(column % side).map(move |j| i * side + j))
 }
@@ -31,6 +32,11 @@ impl ColumnSet {
     /// Adds a column if told to, without a branch.
     pub fn insert_if(&mut self, column: usize, wanted: bool) {
         self.0[column / 64] |= u64::from(wanted) << (column % 64);
+    }
+
+    /// Adds columns.
+    pub fn insert_all(&mut self, columns: impl Iterator<Item = usize>) {
+        columns.for_each(|c| self.insert_if(c, true));
     }
 
     /// Whether a column is in it.

@@ -6,7 +6,7 @@ use super::cues::Prediction;
 use super::hypothesis::{self, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
-use crate::column_set::{ColumnSet, around};
+use crate::column_set::{ColumnSet, columns_near};
 use crate::record::NONE;
 
 /// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.
@@ -19,10 +19,11 @@ impl Clusters {
     pub(super) fn absorb_fragments(&mut self, scans: Scans) {
         let (side, reach) = (scans.first.side, scans.scaled.fragment_distance);
         let visited = &mut ColumnSet::new();
-        // Most static columns are far from anything that moves.
+        // Columns within reach of one that moves, kept up to date: most fragments are far from
+        // those.
         let mut beside = ColumnSet::new();
         let moving = (0..side * side).filter(|c| is_moving(&self.of_column, &self.found, *c));
-        moving.flat_map(|c| around(c, reach, side)).for_each(|c| beside.insert_if(c, true));
+        beside.insert_all(moving.flat_map(|c| columns_near(c, reach, side)));
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
@@ -37,7 +38,7 @@ impl Clusters {
             if let Some(with) = self.joined(&cluster, &near, visited) {
                 for c in columns.iter().map(|c| *c as usize) {
                     self.of_column[c] = with;
-                    around(c, reach, side).for_each(|c| beside.insert_if(c, true));
+                    beside.insert_all(columns_near(c, reach, side));
                 }
             }
         }
@@ -118,9 +119,7 @@ impl Clusters {
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
             if self.is_passed(&scans, columns) {
-                for c in columns {
-                    left.insert(*c as usize);
-                }
+                left.insert_all(columns.iter().map(|c| *c as usize));
             }
         }
         left.iter().for_each(|c| self.of_column[c] = NONE);
@@ -213,7 +212,7 @@ impl Clusters {
     ) -> heapless::Vec<u32, NEIGHBOURS_MAX> {
         let side = scans.first.side;
         let mut near = heapless::Vec::new();
-        for c in columns.iter().flat_map(|c| around(*c as usize, reach, side)) {
+        for c in columns.iter().flat_map(|c| columns_near(*c as usize, reach, side)) {
             let other = self.of_column[c];
             if is_moving(&self.of_column, &self.found, c) && !near.contains(&other) {
                 // Beyond the capacity: the first ones are enough.

@@ -23,8 +23,8 @@ pub struct SeenResidual {
     visible: f32,
 }
 
-/// The same in every sweep, and of the returns of the second sweep that lie where the cluster would
-/// be: those that can be seen in the first.
+/// Residuals of one motion: of the cluster's returns in every sweep, and of the second sweep's
+/// returns in the first, each only if it can be seen.
 pub struct SeenResiduals {
     in_sweeps: heapless::Vec<SeenResidual, TARGETS_MAX>,
     backward: heapless::Vec<f32, SAMPLES_MAX>,
@@ -36,7 +36,7 @@ impl SeenResiduals {
         self.value_in(|_| true)
     }
 
-    /// The same without the sweeps that are not `wanted`.
+    /// The same of the `wanted` sweeps only, and of all returns of the second sweep.
     fn value_in(&self, wanted: impl Fn(usize) -> bool) -> f32 {
         let mut mean = Mean::default();
         let in_sweeps = self.in_sweeps.iter().enumerate().filter(|(n, _)| wanted(*n));
@@ -141,7 +141,7 @@ impl<'a> Cluster<'a> {
     /// Mean truncated residual of a motion, both ways: 0 (all returns lie on something) to 1 (none
     /// does). A return that ends up where nothing can be seen counts as missed, unless the cluster
     /// could move and most of it is seen in the second sweep: behind a corner anything fits.
-    /// `None` if it is not below `limit`; what cannot be is not summed to the end.
+    /// `None` if it is not below `limit`: the sum ends as soon as it cannot be.
     pub fn residual_below(
         &self,
         limit: f32,
@@ -152,14 +152,17 @@ impl<'a> Cluster<'a> {
         let second = self.could_move.then(|| self.seen_in(&targets[0], motion));
         let second = second.filter(|second| self.is_majority(second.visible));
         let mut mean = Mean::default();
-        for (target, left) in targets.iter().zip((0..targets.len()).rev()) {
+        let mut left = targets.iter().map(|t| self.count_in(t)).sum::<usize>() + SAMPLES_MAX;
+        for target in targets {
             mean.include(match second {
                 Some(second) if target.index == 0 => second.mean,
                 Some(_) => self.seen_in(target, motion).mean,
                 None => self.all_in(target, motion),
             });
-            // Everything that is still to come may fit.
-            if mean.value_with((left * (self.samples.len() + 1) + SAMPLES_MAX) as f32) >= limit {
+            left -= self.count_in(target);
+            // Even if all that is still to come fits perfectly: no residual is negative, and
+            // rounding keeps the order.
+            if mean.value_with(left as f32) >= limit {
                 return None;
             }
         }
@@ -168,6 +171,11 @@ impl<'a> Cluster<'a> {
             None => self.add_all_backward(&mut mean, motion, visited),
         }
         Some(mean.value()).filter(|residual| *residual < limit)
+    }
+
+    /// What the cluster's returns count for in one sweep, at most.
+    fn count_in(&self, target: &Target) -> usize {
+        self.samples.len().next_multiple_of(target.stride())
     }
 
     /// Residuals of a motion in one sweep.
@@ -189,7 +197,7 @@ impl<'a> Cluster<'a> {
     fn seen_in(&self, target: &Target, motion: &Motion) -> SeenResidual {
         let mut mean = Mean::default();
         let looked_at = self.samples.iter().step_by(target.stride());
-        let count = looked_at.len() * target.stride();
+        let count = self.count_in(target);
         let seen = looked_at.filter_map(|s| self.scans.seen_residual(s, motion, target));
         seen.for_each(|m| mean.add_weighted(m, target.stride() as f32));
         SeenResidual { mean, visible: mean.count / count.max(1) as f32 }
@@ -232,9 +240,9 @@ impl<'a> Cluster<'a> {
         self.seen_after(in_earliest, &Motion::around(self.centre), visited)
     }
 
-    /// The residual at rest to compare with that of a motion, given all of those at rest. It leaves
-    /// out the sweeps that show little of where the cluster would have been: they may show all of
-    /// it at rest, and would then contribute to that residual only.
+    /// The residual at rest to compare with that of a motion, given `at_rest`, all residuals at
+    /// rest. It leaves out the sweeps that show little of where the cluster would have been: they
+    /// may show all of it at rest, and would then contribute to that residual only.
     pub fn compared_residual(&self, at_rest: &SeenResiduals, motion: &Motion) -> f32 {
         let targets = self.scans.targets;
         at_rest.value_in(|n| self.is_majority(self.seen_in(&targets[n], motion).visible))

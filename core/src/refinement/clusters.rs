@@ -7,7 +7,7 @@ use super::hypothesis::{self, Hypothesis};
 use super::motion::Motion;
 use super::scans::Scans;
 use super::segments::{Segments, agree};
-use crate::column_set::{ColumnSet, around};
+use crate::column_set::{ColumnSet, columns_near};
 use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill, share};
@@ -239,7 +239,7 @@ fn grow(
     };
     // Given only in the end: looks leave out where the part alone was, in whatever order.
     let mut given = ColumnSet::new();
-    for beside in columns.iter().flat_map(|c| around(*c as usize, 1, side)) {
+    for beside in columns.iter().flat_map(|c| columns_near(*c as usize, 1, side)) {
         let worn = |c| scans.worn(&[c as u32], motion, |c| of_column[c] == part);
         let open = of_column[beside] == parent && !given.contains(beside);
         if open && fits(beside) && worn(beside) <= worn_max {

@@ -126,7 +126,8 @@ impl<'a> Scans<'a> {
             return 0.0;
         }
         let weight = of.weight(self.scaled, s.index);
-        (squared_distance(&weight, minus(q.at, at)) / (truncation * truncation)).min(1.0)
+        // Weights are rounded: along a surface the distance might come out negative.
+        (squared_distance(&weight, minus(q.at, at)) / (truncation * truncation)).clamp(0.0, 1.0)
     }
 
     /// Residual of a return of the first sweep in a target sweep, if it moved.

@@ -247,7 +247,21 @@ fn columns_with_returns(cloud: DetailedCloud) -> Vec<u32> {
     (0..(SIDE * SIDE) as u32).filter(|c| cloud.levels(*c as usize) != 0).collect()
 }
 
-/// The residual of a motion, whatever the limit.
+/// A cluster of all columns of the first sweep.
+fn cluster_of<'a>(
+    scaled: &'a Scaled,
+    first: DetailedCloud<'a>,
+    targets: &'a [Target<'a>],
+    detail: &'a CloudDetail,
+    scores: &'a [ColumnScores],
+    part: &'a [u32],
+) -> Cluster<'a> {
+    let (traffic, history) = (&[], &NO_HISTORY);
+    let scans = Scans { scaled, first, targets, detail, scores, traffic, span_s: 0.1, history };
+    Cluster::new(scans, part)
+}
+
+/// The residual of a motion; checks that a limit only decides whether it is returned.
 fn residual_of(cluster: &Cluster, motion: &Motion) -> f32 {
     let residual = |limit| cluster.residual_below(limit, motion, &mut ColumnSet::new());
     let whole = residual(f32::INFINITY).unwrap();
@@ -276,11 +290,7 @@ fn potential_movers_may_go_where_nothing_is_seen() {
     let targets = [Target { index: 0, cloud: &target, offset: [0.0; 3], share: 1.0 }];
     let part = columns_with_returns(first);
     let (scaled, targets, could) = (&scaled, &targets, scored(127));
-    let cluster = |scores| {
-        let (traffic, history) = (&[], &NO_HISTORY);
-        let scans = Scans { scaled, first, targets, detail, scores, traffic, span_s: 0.1, history };
-        Cluster::new(scans, &part)
-    };
+    let cluster = |scores| cluster_of(scaled, first, targets, detail, scores, &part);
     let residual = |cluster: Cluster| {
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
         residual_of(&cluster, &motion)
@@ -304,17 +314,26 @@ fn objects_entering_the_window_were_outside() {
     let first = first.all();
     let part = columns_with_returns(first);
     let (scaled, detail) = (&scaled(), second.all().detail);
-    let scans = Scans {
-        scaled,
-        first,
-        targets: &targets,
-        detail,
-        scores: &[],
-        traffic: &[],
-        span_s: 0.1,
-        history: &NO_HISTORY,
-    };
-    let cluster = Cluster::new(scans, &part);
+    let cluster = cluster_of(scaled, first, &targets, detail, &[], &part);
     let moved = |by| residual_of(&cluster, &Motion::around(cluster.centre).displaced([by, 0.0]));
     assert!(moved(-8.0) < 0.05 && moved(-7.0) > 0.1, "{} {}", moved(-8.0), moved(-7.0));
+}
+
+#[test]
+fn a_limit_ends_no_sum_too_early() {
+    let mut random = Random(14);
+    let car = Car { centre: [25.0, 31.0], yaw: 0.0 };
+    let [first, before, earlier] =
+        [(); 3].map(|()| sweep_of(&car, &mut random).in_sight(|_| true).cloud());
+    // Seen through in the second sweep: the first third of the residuals is 1.
+    let second = Returns::flat().in_sight(|_| true).cloud();
+    let target = |index, cloud, share| Target { index, cloud, offset: [0.0; 3], share };
+    let targets = [target(0, &second, 1.0), target(1, &before, -1.0), target(2, &earlier, -3.0)];
+    let first = first.all();
+    let (part, scaled, detail) = (columns_with_returns(first), &scaled(), second.all().detail);
+    for scores in [&[][..], &scored(127)] {
+        let cluster = cluster_of(scaled, first, &targets, detail, scores, &part);
+        let residual = residual_of(&cluster, &Motion::around(cluster.centre));
+        assert!((residual - 1.0 / 3.0).abs() < 0.02, "{residual}");
+    }
 }
