@@ -135,3 +135,23 @@ fn what_a_car_passes_is_left_behind() {
         [[1, 1], [-1, 1], [-1, -1]].map(|scores| moving_in(&sweeps, wall, scores));
     assert!(whole > 0 && left == 0 && doubted == whole, "{whole} {left} {doubted}");
 }
+
+#[test]
+fn fragments_follow_those_that_joined_before() {
+    // Two bits ahead of a car, too small to move by themselves; only the nearer is near the car.
+    let foremost = |between: bool| {
+        let mut random = Random(9);
+        let sweep = |n: usize| {
+            let x = 21.5 + 2.0 * n as f32;
+            let mut returns = sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random);
+            for ahead in [10.0, 14.0].into_iter().skip(usize::from(!between)) {
+                (1..4).for_each(|z| returns.add([x + ahead, 28.5, GROUND + z as f32], 0));
+            }
+            returns
+        };
+        let sweeps: Vec<Returns> = (0..3).map(sweep).collect();
+        let found = found_with_scores(&sweeps, &vec![pack_flow([2, 0]); SIDE * SIDE], &[]);
+        found[37 * SIDE + 28].is_some()
+    };
+    assert!(foremost(true) && !foremost(false));
+}
