@@ -7,7 +7,7 @@
 //!
 //! Parameters are in metres; positions and heights are in the caller's unit, the edge of a column.
 
-use crate::column_set::ColumnSet;
+use crate::column_set::{ColumnSet, columns_near};
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
 use core::ops::Range;
 
@@ -175,16 +175,13 @@ impl GroundEstimator {
             return;
         }
         let (i, j) = (column / side, column % side);
-        for a in i.saturating_sub(1)..(i + 2).min(side) {
-            for b in j.saturating_sub(1)..(j + 2).min(side) {
-                let beside = a * side + b;
-                let rise = low - self.low[beside];
-                let run2 = (i.abs_diff(a) + j.abs_diff(b)) as f32;
-                let is_ground = self.low[beside] <= ground.0[beside] + tolerance && is_thin(beside);
-                if is_ground && rise * rise <= slope * slope * run2 {
-                    ground.0[column] = low;
-                    return;
-                }
+        for beside in columns_near(column, 1, side) {
+            let rise = low - self.low[beside];
+            let run2 = (i.abs_diff(beside / side) + j.abs_diff(beside % side)) as f32;
+            let is_ground = self.low[beside] <= ground.0[beside] + tolerance && is_thin(beside);
+            if is_ground && rise * rise <= slope * slope * run2 {
+                ground.0[column] = low;
+                return;
             }
         }
     }
@@ -203,16 +200,9 @@ impl GroundEstimator {
     /// Lowers each cell to at most `fall` above its lowest neighbour.
     fn extrapolate(&mut self, fall: f32) {
         let n = self.side;
-        for i in 0..n {
-            for j in 0..n {
-                let mut height = self.height[i * n + j];
-                for a in i.saturating_sub(1)..(i + 2).min(n) {
-                    for b in j.saturating_sub(1)..(j + 2).min(n) {
-                        height = height.min(self.height[a * n + b] + fall);
-                    }
-                }
-                self.extrapolated[i * n + j] = height;
-            }
+        for cell in 0..n * n {
+            let around = columns_near(cell, 1, n).map(|beside| self.height[beside] + fall);
+            self.extrapolated[cell] = around.fold(self.height[cell], f32::min);
         }
         self.height[..n * n].copy_from_slice(&self.extrapolated[..n * n]);
     }

@@ -22,7 +22,8 @@ impl Clusters {
         // Columns within reach of one that moves, kept up to date: most fragments are far from
         // those.
         let mut beside = ColumnSet::new();
-        let moving = (0..side * side).filter(|c| is_moving(&self.of_column, &self.found, *c));
+        let columns = scans.first.columns();
+        let moving = columns.filter(|c| is_moving(&self.of_column, &self.found, *c));
         beside.insert_all(moving.flat_map(|c| columns_near(c, reach, side)));
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_, _| true);
         for n in 0..self.segments.len() {
@@ -85,14 +86,13 @@ impl Clusters {
     /// learned may still move.
     pub(super) fn drop_immovable(&mut self, scans: Scans) {
         self.found.iter_mut().for_each(|f| f.similarity = 0);
-        let columns = scans.first.side * scans.first.side;
-        for c in 0..columns {
+        for c in scans.first.columns() {
             let found = self.found.get_mut(self.of_column[c] as usize);
             if let Some(found) = found.filter(|f| f.is_dynamic) {
                 found.similarity += if scans.stays(c) { -1 } else { 1 };
             }
         }
-        for c in 0..columns {
+        for c in scans.first.columns() {
             let found = self.found.get(self.of_column[c] as usize);
             if found.is_some_and(|f| f.is_dynamic && !f.may_include(&scans, c)) {
                 self.of_column[c] = NONE;
@@ -133,8 +133,7 @@ impl Clusters {
             return false;
         }
         let [rest, moved] = Cluster::new(*scans, columns).own_residuals(motion);
-        let side = scans.first.side;
-        let mut of_cluster = (0..side * side).filter(|c| self.of_column[*c] == id);
+        let mut of_cluster = scans.first.columns().filter(|c| self.of_column[*c] == id);
         evidence(rest, moved) <= scans.scaled.params.evidence_min
             && of_cluster.any(|c| scans.could_move(c) > 0.0)
     }
@@ -154,7 +153,7 @@ impl Clusters {
     /// encoder takes it for road beside the cluster.
     pub(super) fn include_ground(&mut self, scans: Scans) {
         let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
-        for c in 0..side * side {
+        for c in scans.first.columns() {
             let found = self.found.get_mut(self.of_column[c] as usize);
             let Some(found) = found.filter(|f| f.is_dynamic) else { continue };
             let returns = scans.first.column(c).map(|n| scans.first.sample(n).at);

@@ -129,6 +129,11 @@ impl Cloud {
         inside.then(|| x as usize * self.side + y as usize)
     }
 
+    /// All columns of the window.
+    pub fn columns(&self) -> Range<usize> {
+        0..self.side * self.side
+    }
+
     /// The centre of a column, voxels.
     pub fn centre_of(&self, column: usize) -> [f32; 2] {
         [column / self.side, column % self.side].map(|c| c as f32 + 0.5)

@@ -153,7 +153,7 @@ impl Clusters {
         suspect: impl Fn(usize) -> bool + Sync,
     ) {
         let suspect = |c: usize| is_static(&self.of_column, &self.found, c) && suspect(c);
-        let columns = scans.first.side * scans.first.side;
+        let columns = scans.first.columns().end;
         fill(team, 0, &mut self.suspects.words()[..columns.div_ceil(64)], &|word| {
             let bits = (64 * word..columns.min(64 * (word + 1))).enumerate();
             bits.fold(0, |bits, (n, c)| bits | u64::from(suspect(c)) << n)
@@ -187,7 +187,7 @@ impl Clusters {
     /// Finds what was hit before at the places that moving clusters came to.
     fn find_earlier_hits(&mut self, scans: Scans) {
         self.found.iter_mut().for_each(|f| f.looks = Looks::default());
-        for c in 0..scans.first.side * scans.first.side {
+        for c in scans.first.columns() {
             if is_moving(&self.of_column, &self.found, c) {
                 let looks = self.looks(&scans, c);
                 self.found[self.of_column[c] as usize].looks += looks;

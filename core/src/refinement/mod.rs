@@ -143,7 +143,7 @@ impl Refinement {
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let targets = self.clouds.targets(span_s);
         let detail = self.clouds.second().detail;
-        let traffic = &starts::traffic((0..side * side).filter_map(predicted));
+        let traffic = &starts::traffic(first.columns().filter_map(predicted));
         let (targets, history) = (&targets, &self.history);
         let scans = Scans { scaled, first, targets, detail, scores, traffic, span_s, history };
         self.clusters.find(team, scans, flow, predicted);

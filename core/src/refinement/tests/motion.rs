@@ -247,7 +247,7 @@ fn columns_with_returns(cloud: DetailedCloud) -> Vec<u32> {
     (0..(SIDE * SIDE) as u32).filter(|c| cloud.levels(*c as usize) != 0).collect()
 }
 
-/// A cluster of all columns of the first sweep.
+/// A cluster of some columns of the first sweep; there is neither traffic nor history.
 fn cluster_of<'a>(
     scaled: &'a Scaled,
     first: DetailedCloud<'a>,
