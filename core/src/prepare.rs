@@ -221,7 +221,7 @@ impl<'a> Caster<'a> {
         let count = out.columns.len();
         self.simd.run(
             #[inline(always)]
-            || {
+            |_| {
                 let mut batch = ReturnBatch::new();
                 for (n, point) in points.take(count).enumerate() {
                     match out.dropped.admit(self.rig, point) {

@@ -258,8 +258,8 @@ pub struct BackendChoice {
     /// Compute backend
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub backend: BackendKind,
-    /// Instruction set used on the CPU: sse2 or avx2, on Arm neon [default: the widest it has].
-    /// Results are the same
+    /// Instruction set used on the CPU: sse2, avx2 or avx512, on Arm neon [default: the widest it
+    /// has]. Results are the same
     #[arg(long, value_name = "NAME", value_parser = simd)]
     pub simd: Option<Simd>,
     /// Device index, see `raywake devices`

@@ -31,15 +31,6 @@ impl<const OUT: usize> CellSums<'_, OUT> {
         activations
     }
 
-    /// Adds the shifted sums to the activations of a cell.
-    #[inline(always)]
-    fn add_to(&self, cell: &mut [u8; OUT]) {
-        for (n, value) in cell.iter_mut().enumerate() {
-            let sum = i32::from(*value) + (self.sums[n] >> self.shifts[n]);
-            *value = sum.clamp(0, TOP) as u8;
-        }
-    }
-
     #[inline(always)]
     fn scores(&self) -> [i8; OUT] {
         let mut scores = [0; OUT];
@@ -47,6 +38,21 @@ impl<const OUT: usize> CellSums<'_, OUT> {
             *score = (sum >> shift).clamp(-TOP, TOP) as i8;
         }
         scores
+    }
+}
+
+/// Writes the activations to a cell.
+#[inline(always)]
+fn write_to<const OUT: usize>(sums: &CellSums<OUT>, cell: &mut [u8; OUT]) {
+    *cell = sums.activations();
+}
+
+/// Adds the shifted sums to the activations of a cell.
+#[inline(always)]
+fn add_to<const OUT: usize>(sums: &CellSums<OUT>, cell: &mut [u8; OUT]) {
+    for (n, value) in cell.iter_mut().enumerate() {
+        let sum = i32::from(*value) + (sums.sums[n] >> sums.shifts[n]);
+        *value = sum.clamp(0, TOP) as u8;
     }
 }
 
@@ -100,8 +106,11 @@ impl EncoderWeights {
         let (mut inputs, mut sums) = ([[0; IN]; CELLS], [[0; OUT]; CELLS]);
         for from in (0..count).step_by(CELLS) {
             let cells = CELLS.min(count - from);
-            for (n, x) in inputs[..cells].iter_mut().enumerate() {
-                *x = input(from + n).map(i16::from);
+            for (n, inputs) in inputs[..cells].iter_mut().enumerate() {
+                // Not `map`, which compilers neither inline nor vectorise for long arrays.
+                for (to, x) in inputs.iter_mut().zip(input(from + n)) {
+                    *to = i16::from(x);
+                }
             }
             sums[..cells].fill(*biases);
             simd.add_products(weights, &inputs[..cells], &mut sums[..cells]);
@@ -136,6 +145,39 @@ impl EncoderWeights {
         }
     }
 
+    /// Applies a dense layer to all cells of a level with `side` cells along an axis: `input`
+    /// supplies the inputs of the cell at a row and a place in it, `done` receives its sums beside
+    /// the cell of `to`.
+    #[inline(always)]
+    fn dense_level<const IN: usize, const OUT: usize>(
+        &self,
+        team: &impl Team,
+        layer: usize,
+        side: usize,
+        to: &mut [u8],
+        input: impl Fn(usize, usize) -> [u8; IN] + Sync + Copy,
+        done: impl Fn(&CellSums<OUT>, &mut [u8; OUT]) + Sync + Copy,
+    ) {
+        each_row(
+            team,
+            to,
+            side * OUT,
+            #[inline(always)]
+            move |simd, row, out| {
+                let out = cells::<OUT>(out);
+                self.dense(
+                    simd,
+                    layer,
+                    side,
+                    #[inline(always)]
+                    |at| input(row, at),
+                    #[inline(always)]
+                    |at, sums| done(&sums, &mut out[at]),
+                );
+            },
+        );
+    }
+
     /// Computes the finest level, with 2 x 2 columns per cell.
     pub(super) fn down_from_columns(
         &self,
@@ -144,21 +186,20 @@ impl EncoderWeights {
         side: usize,
         to: &mut [u8],
     ) {
-        each_row(
+        self.dense_level(
             team,
+            DOWN_FINE,
+            side,
             to,
-            side * FINE_CHANNELS,
             #[inline(always)]
-            move |simd, row, out| {
-                let (out, input) = (cells::<FINE_CHANNELS>(out), |at| {
-                    let mut x = [0; 4 * COLUMN_CHANNELS];
-                    for (n, x) in cells(&mut x).iter_mut().enumerate() {
-                        *x = self.column(window.masks(2 * row + n / 2, 2 * at + n % 2));
-                    }
-                    x
-                });
-                self.dense(simd, DOWN_FINE, side, input, |at, sums| out[at] = sums.activations());
+            |row, at| {
+                let mut x = [0; 4 * COLUMN_CHANNELS];
+                for (n, x) in cells(&mut x).iter_mut().enumerate() {
+                    *x = self.column(window.masks(2 * row + n / 2, 2 * at + n % 2));
+                }
+                x
             },
+            write_to::<FINE_CHANNELS>,
         );
     }
 
@@ -170,17 +211,14 @@ impl EncoderWeights {
         from: Plane<IN>,
         to: &mut [u8],
     ) {
-        let side = from.side / 2;
-        each_row(
+        self.dense_level(
             team,
+            layer,
+            from.side / 2,
             to,
-            side * OUT,
             #[inline(always)]
-            move |simd, row, out| {
-                let out = cells::<OUT>(out);
-                let input = |at| gathered::<IN, ALL>(&from, row, at);
-                self.dense(simd, layer, side, input, |at, sums| out[at] = sums.activations());
-            },
+            |row, at| gathered::<IN, ALL>(&from, row, at),
+            write_to::<OUT>,
         );
     }
 
@@ -202,26 +240,15 @@ impl EncoderWeights {
             #[inline(always)]
             move |_, row, out| self.depthwise(first, from, row, cells(out)),
         );
-        self.add_dense_layer(team, first + 1, Plane::<CHANNELS> { side, cells: beside }, level);
-    }
-
-    /// Adds a dense layer's outputs to a level with the same number of cells.
-    fn add_dense_layer<const CHANNELS: usize>(
-        &self,
-        team: &impl Team,
-        layer: usize,
-        from: Plane<CHANNELS>,
-        to: &mut [u8],
-    ) {
-        each_row(
+        let from = Plane::<CHANNELS> { side, cells: beside };
+        self.dense_level(
             team,
-            to,
-            from.side * CHANNELS,
+            first + 1,
+            side,
+            level,
             #[inline(always)]
-            move |simd, row, out| {
-                let (out, input) = (cells::<CHANNELS>(out), |at| *from.at(row, at));
-                self.dense(simd, layer, from.side, input, |at, sums| sums.add_to(&mut out[at]));
-            },
+            |row, at| *from.at(row, at),
+            add_to::<CHANNELS>,
         );
     }
 
@@ -246,10 +273,12 @@ impl EncoderWeights {
                     simd,
                     layer,
                     from.side,
+                    #[inline(always)]
                     |at| *from.at(row, at),
+                    #[inline(always)]
                     |at, sums| {
-                        for line in &mut lines {
-                            line[2 * at..][..2].iter_mut().for_each(|cell| sums.add_to(cell));
+                        for cell in lines.iter_mut().flat_map(|line| &mut line[2 * at..][..2]) {
+                            add_to(&sums, cell);
                         }
                     },
                 );
@@ -264,18 +293,14 @@ impl EncoderWeights {
         from: Plane<FINE_CHANNELS>,
         to: &mut [u8],
     ) {
-        each_row(
+        self.dense_level(
             team,
+            UP_COLUMN,
+            from.side,
             to,
-            from.side * COLUMN_CHANNELS,
             #[inline(always)]
-            move |simd, row, out| {
-                let out = cells::<COLUMN_CHANNELS>(out);
-                let input = |at| *from.at(row, at);
-                self.dense(simd, UP_COLUMN, from.side, input, |at, sums| {
-                    out[at] = sums.activations()
-                });
-            },
+            |row, at| *from.at(row, at),
+            write_to::<COLUMN_CHANNELS>,
         );
     }
 
@@ -292,18 +317,27 @@ impl EncoderWeights {
         let mut hidden = [[0; HEAD_CHANNELS]; CELLS];
         for from in (0..count).step_by(CELLS) {
             let columns = CELLS.min(count - from);
-            let input = |n| {
-                let mut x = [0; 2 * COLUMN_CHANNELS];
-                let own = self.column(masks(from + n));
-                cells(&mut x).copy_from_slice(&[*around(from + n), own]);
-                x
-            };
-            self.dense(simd, HEAD, columns, input, |n, sums| hidden[n] = sums.activations());
+            self.dense(
+                simd,
+                HEAD,
+                columns,
+                #[inline(always)]
+                |n| {
+                    let mut x = [0; 2 * COLUMN_CHANNELS];
+                    let own = self.column(masks(from + n));
+                    cells(&mut x).copy_from_slice(&[*around(from + n), own]);
+                    x
+                },
+                #[inline(always)]
+                |n, sums| hidden[n] = sums.activations(),
+            );
             self.dense(
                 simd,
                 SCORE,
                 columns,
+                #[inline(always)]
                 |n| hidden[n],
+                #[inline(always)]
                 |n, sums| done(from + n, sums.scores()),
             );
         }

@@ -51,7 +51,7 @@ pub fn each_row<T: Send>(
     share(team, 1, 0..rows, out, length, &move |rows, out| {
         simd.run(
             #[inline(always)]
-            move || fill(simd, rows.start, out),
+            move |simd| fill(simd, rows.start, out),
         );
     });
 }

@@ -156,7 +156,7 @@ impl Cloud {
     pub fn nearest(&self, at: [f32; 3], sensor: u32, reach: [f32; 2]) -> Option<(f32, CloudPoint)> {
         let found = self.simd.run(
             #[inline(always)]
-            move || self.find_nearest(at, sensor, reach),
+            move |_| self.find_nearest(at, sensor, reach),
         );
         found.map(|(d2, n)| (d2, self.sample(n)))
     }
@@ -213,7 +213,7 @@ impl Cloud {
         let columns = j.saturating_sub(reach)..(j + reach + 1).min(self.side);
         self.simd.run(
             #[inline(always)]
-            || {
+            |_| {
                 let mut sums = MomentSums::ZERO;
                 for a in i.saturating_sub(reach)..(i + reach + 1).min(self.side) {
                     let row = self.row(a, columns.start, columns.end);

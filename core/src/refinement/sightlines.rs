@@ -98,7 +98,7 @@ impl Sightlines {
         let share = share_kept(placed.len());
         let count = simd.run(
             #[inline(always)]
-            || {
+            |_| {
                 let (mut batch, mut count) = (RayBatch::new(), 0);
                 for (n, placed) in placed.iter().enumerate() {
                     let taken = is_kept(n, share) && placed.at.iter().all(|v| v.is_finite());
@@ -181,7 +181,7 @@ impl Sightlines {
             let within = nearest.squared_distance.min(reach * reach);
             let found = simd.run(
                 #[inline(always)]
-                || self.nearest(bands, azimuth, &surface, within),
+                |_| self.nearest(bands, azimuth, &surface, within),
             );
             nearest = if found.depth.is_some() { found } else { nearest };
         }

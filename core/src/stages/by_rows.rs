@@ -40,7 +40,7 @@ pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
             let foreground = &foreground[rows];
             simd.run(
                 #[inline(always)]
-                move || {
+                move |_| {
                     occupancy_constancy_by_lines(
                         sweep, weights, costs, foreground, before, now, pairs,
                     );
@@ -58,7 +58,7 @@ pub fn window_minima(s: &mut Storage, workers: &dyn Workers) {
     share(workers, PIECE_ROWS_MAX, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
         simd.run(
             #[inline(always)]
-            move || window(sweep, &foreground[rows], index, pairs, least),
+            move |_| window(sweep, &foreground[rows], index, pairs, least),
         );
     });
 }
@@ -79,7 +79,7 @@ pub fn expectation(s: &mut Storage, workers: &dyn Workers) {
             let (of_rows, least) = (&foreground[rows.clone()], &least[rows]);
             simd.run(
                 #[inline(always)]
-                move || {
+                move |_| {
                     expectation_by_rings(
                         sweep, of_rows, index, pairs, flow, targets, least, proposal,
                     );

@@ -288,7 +288,7 @@ macro_rules! stage {
         stage!(@@ $name, ($($($a)+),*), $kernels, [], |storage, workers| {
             workers.simd().run(
                 #[inline(always)]
-                || $twin($(passed!(storage, $($a)+)),*),
+                |_| $twin($(passed!(storage, $($a)+)),*),
             )
         })
     };
