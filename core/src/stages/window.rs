@@ -44,14 +44,19 @@ impl<'a> WindowCosts<'a> {
     ) -> WindowCosts<'a> {
         let (rows_of_pairs, _) = pair_cost.as_chunks::<ROW>();
         let mut costs = WindowCosts { rows: heapless::Vec::new(), unknown: 0 };
-        for neighbour in neighbours(sweep, column as usize) {
-            match foreground_index[neighbour] {
-                NONE => costs.unknown += COST_UNKNOWN as u16,
-                n => {
-                    // There is room for all nine.
-                    let _ = costs.rows.push(&rows_of_pairs[n as usize]);
-                }
+        let mut add = |index: u32| match index {
+            NONE => costs.unknown += COST_UNKNOWN as u16,
+            n => {
+                // There is room for all nine.
+                let _ = costs.rows.push(&rows_of_pairs[n as usize]);
             }
+        };
+        let (side, column) = (sweep.side, column as i32);
+        let [i, j] = [column / side, column % side];
+        let (from, to) = ((j - 1).max(0), (j + 1).min(side - 1));
+        for line in (i - 1).max(0)..=(i + 1).min(side - 1) {
+            let around = (line * side + from) as usize..=(line * side + to) as usize;
+            foreground_index[around].iter().for_each(|index| add(*index));
         }
         costs
     }
@@ -130,16 +135,6 @@ pub fn outside_cost(sweep: &SweepUniform, column: usize) -> i32 {
     let side = sweep.side;
     let inside = |at: i32| 1 + i32::from(at > 0) + i32::from(at + 1 < side);
     (9 - inside(column as i32 / side) * inside(column as i32 % side)) * sweep.outside_cost
-}
-
-/// The 3x3 columns around one, as far as they are in the window.
-#[inline(always)]
-fn neighbours(sweep: &SweepUniform, column: usize) -> impl Iterator<Item = usize> {
-    let side = sweep.side;
-    let (i, j) = (column as i32 / side, column as i32 % side);
-    let around = (0..9).map(move |n| (i + n / 3 - 1, j + n % 3 - 1));
-    let inside = around.filter(move |(i, j)| (0..side).contains(i) && (0..side).contains(j));
-    inside.map(move |(i, j)| (i * side + j) as usize)
 }
 
 #[cfg(test)]

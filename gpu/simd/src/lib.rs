@@ -163,7 +163,8 @@ mod tests {
         };
         let weights: [[[i16; 2]; OUT]; IN / 2] =
             core::array::from_fn(|_| core::array::from_fn(|_| [next() / 8, next() / 8]));
-        let inputs: [[i16; IN]; 19] = core::array::from_fn(|_| core::array::from_fn(|_| next() / 8));
+        let inputs: [[i16; IN]; 19] =
+            core::array::from_fn(|_| core::array::from_fn(|_| next() / 8));
         for simd in Simd::available() {
             let mut sums = [[5; OUT]; 19];
             simd.run(
