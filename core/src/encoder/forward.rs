@@ -146,8 +146,8 @@ impl EncoderWeights {
     }
 
     /// Applies a dense layer to all cells of a level with `side` cells along an axis: `input`
-    /// supplies the inputs of the cell at a row and a place in it, `done` receives its sums beside
-    /// the cell of `to`.
+    /// supplies the inputs of the cell at a row and a place in it, `done` receives its sums and its
+    /// cell in `to`.
     #[inline(always)]
     fn dense_level<const IN: usize, const OUT: usize>(
         &self,

@@ -4,7 +4,8 @@ extern crate std;
 use super::*;
 use crate::digest::Digest;
 use crate::random::Random;
-use crate::team::SingleThread;
+use crate::team::Team;
+use raywake_simd::Simd;
 use std::fmt::Write;
 use std::string::String;
 use std::vec::Vec;
@@ -40,6 +41,21 @@ fn columns(random: &mut Random, side: usize) -> Vec<Column> {
     (0..side * side).map(|_| one(random)).collect()
 }
 
+/// With this instruction set.
+struct OneThread(Simd);
+
+impl Team for OneThread {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        a();
+        b();
+    }
+
+    fn simd(&self) -> Simd {
+        self.0
+    }
+}
+
+/// The scores, the same with every instruction set.
 fn encoded(
     weights: &EncoderWeights,
     columns: &[Column],
@@ -49,8 +65,15 @@ fn encoded(
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
     encoder.set_weights(Some(weights));
     encoder.keep(columns, side, corner);
-    encoder.encode(&SingleThread);
-    encoder.scores().to_vec()
+    let mut scores_with = |simd| {
+        encoder.encode(&OneThread(simd));
+        encoder.scores().to_vec()
+    };
+    let scores = scores_with(Simd::BASELINE);
+    for simd in Simd::available() {
+        assert_eq!(scores_with(simd), scores, "{}", simd.name());
+    }
+    scores
 }
 
 /// The network written out plainly: levels of `[row][column][channel]`, loops over everything.

@@ -12,7 +12,7 @@ use crate::ground::GroundEstimator;
 use crate::params::{CLUSTER_LEVELS_MAX, SIGHTLINES_MAX};
 use crate::team::Team;
 use core::ops::{Deref, Range};
-use raywake_simd::Simd;
+use raywake_simd::{Simd, integer_part};
 
 /// Scratch of [`Cloud::fill`].
 pub struct Scratch {
@@ -173,24 +173,26 @@ impl Cloud {
         if !(near(at[0]) && near(at[1])) {
             return None;
         }
-        // A place up to one voxel outside the window still has neighbours inside.
-        let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
-        let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
+        // A place up to one voxel outside the window still has neighbours inside. Signed, because
+        // converting floats to unsigned integers and back takes several times as many instructions.
+        let [x, y] = [at[0] + 1.0, at[1] + 1.0];
+        let ([i, j], side) = ([x, y].map(integer_part), self.side as i32);
+        let (in_row, in_column) = (x - i as f32, y - j as f32);
+        let (j_from, j_to) = ((j - 2).max(0), (j + 1).min(side));
         let mut nearest = Nearest::within(reach * reach);
         let mut least = reach * reach;
-        let (in_row, in_column) = (at[0] + 1.0 - i as f32, at[1] + 1.0 - j as f32);
         // The row it lies in first: what is found there often rules out the others.
-        for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
-            let row = row.wrapping_sub(1);
-            if row >= self.side || gap * gap >= least {
+        for (row, gap) in [(i - 1, 0.0), (i - 2, in_row), (i, 1.0 - in_row)] {
+            if row < 0 || row >= side || gap * gap >= least {
                 continue;
             }
             // A column this far off cannot hold a nearer return.
             let left = gap * gap + in_column * in_column < least;
             let right = gap * gap + (1.0 - in_column) * (1.0 - in_column) < least;
-            let from = if left { j_from } else { j.saturating_sub(1).max(j_from) };
+            let from = if left { j_from } else { (j - 1).max(j_from) };
             let to = if right { j_to } else { j.min(j_to) };
-            let row = self.row(row, from, to.max(from));
+            let [row, from, to] = [row, from, to.max(from)].map(|at| at as usize);
+            let row = self.row(row, from, to);
             self.thinned.places.look(row, at, sensor, &mut nearest);
             least = nearest.squared_distance();
             if least < enough * enough {

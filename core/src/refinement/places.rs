@@ -61,11 +61,11 @@ impl Nearest {
     /// Its squared distance, or the one within which nothing was found.
     #[inline(always)]
     pub fn squared_distance(&self) -> f32 {
-        let mut least = self.least[0];
-        for of_lane in self.least {
-            least = if of_lane < least { of_lane } else { least };
-        }
-        least
+        // Non-negative floats sort like their bits, whose minimum may be found in any order.
+        let bits = self.least.map(f32::to_bits);
+        let least =
+            bits.iter().fold(u32::MAX, |least, bits| if *bits < least { *bits } else { least });
+        f32::from_bits(least)
     }
 
     /// Its squared distance and index; among equally near ones, the first of the first look.

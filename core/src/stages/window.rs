@@ -4,6 +4,7 @@
 
 use crate::params::{COST_UNKNOWN, LINE, REACH, ROW, SIDE};
 use crate::record::{MinCost, NONE, SweepUniform};
+use core::ops::Range;
 
 /// Costs of a column at its displacements, ordered as in [`ROW`].
 pub trait Costs {
@@ -51,12 +52,8 @@ impl<'a> WindowCosts<'a> {
                 let _ = costs.rows.push(&rows_of_pairs[n as usize]);
             }
         };
-        let (side, column) = (sweep.side, column as i32);
-        let [i, j] = [column / side, column % side];
-        let (from, to) = ((j - 1).max(0), (j + 1).min(side - 1));
-        for line in (i - 1).max(0)..=(i + 1).min(side - 1) {
-            let around = (line * side + from) as usize..=(line * side + to) as usize;
-            foreground_index[around].iter().for_each(|index| add(*index));
+        for row in rows_around(sweep, column, 1) {
+            foreground_index[row].iter().for_each(|index| add(*index));
         }
         costs
     }
@@ -137,6 +134,19 @@ pub fn outside_cost(sweep: &SweepUniform, column: usize) -> i32 {
     (9 - inside(column as i32 / side) * inside(column as i32 % side)) * sweep.outside_cost
 }
 
+/// The columns of the window at most `reach` from one along each axis, itself included, row by row.
+#[inline(always)]
+pub fn rows_around(
+    sweep: &SweepUniform,
+    column: u32,
+    reach: u32,
+) -> impl Iterator<Item = Range<usize>> {
+    let side = sweep.side as u32;
+    let around = |at: u32| at.saturating_sub(reach)..(at + reach + 1).min(side);
+    let (rows, across) = (around(column / side), around(column % side));
+    rows.map(move |i| (i * side + across.start) as usize..(i * side + across.end) as usize)
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -152,13 +162,13 @@ mod tests {
             displacement_cost: 3,
             ..Default::default()
         };
-        let foreground: Vec<u32> = (0..33 * 33).filter(|n| n % 4 != 0).collect();
+        let foreground: Vec<u32> = (0..33 * 33).filter(|n| n % 4 != 1).collect();
         let mut rank = vec![NONE; 33 * 33];
         foreground.iter().enumerate().for_each(|(n, c)| rank[*c as usize] = n as u32);
         let cost: Vec<u16> = (0..foreground.len() * ROW).map(|n| (n * 31 % 5379) as u16).collect();
         let mut min_cost = vec![[0; 2]; foreground.len()];
         window(&sweep, &foreground, &rank, &cost, &mut min_cost);
-        for (n, source) in foreground.iter().enumerate().step_by(7) {
+        for (n, source) in foreground.iter().enumerate() {
             let (i, j) = (*source as i32 / 33, *source as i32 % 33);
             let around = WindowCosts::of(&sweep, &rank, &cost, *source);
             let mut all = [0; ROW];

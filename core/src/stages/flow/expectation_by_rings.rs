@@ -5,7 +5,7 @@ use crate::params::{LINE, REACH, ROW};
 use crate::record::{
     Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement, pack_flow,
 };
-use crate::stages::window::{Costs, WindowCosts, outside_cost};
+use crate::stages::window::{Costs, WindowCosts, outside_cost, rows_around};
 
 /// [`expectation`](super::expectation::expectation) without examining everything: see [`propose`].
 #[expect(clippy::too_many_arguments, reason = "one for every buffer")]
@@ -74,14 +74,11 @@ impl Sums {
     /// Without a branch per flow.
     #[inline(always)]
     fn of(sweep: &SweepUniform, flow: &[Flow], column: u32) -> Sums {
-        let (side, column) = (sweep.side, column as i32);
-        let (i, j) = (column / side, column % side);
-        let (from, to) = ((j - 2).max(0), (j + 2).min(side - 1));
         let mut n = Sums { count: 0, sum: [0; 2], squares: 0 };
-        for line in (i - 2).max(0)..=(i + 2).min(side - 1) {
-            let around = &flow[(line * side + from) as usize..=(line * side + to) as usize];
+        for row in rows_around(sweep, column, 2) {
+            let around = &flow[row];
             // Mostly five: a loop of known length is unrolled.
-            match around.first_chunk::<5>() {
+            match around.as_array::<5>() {
                 Some(five) => five.iter().for_each(|f| n.add(*f, 1)),
                 None => around.iter().for_each(|f| n.add(*f, 1)),
             }
