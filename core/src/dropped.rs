@@ -19,16 +19,18 @@ pub enum ReturnKind {
 
 impl ReturnKind {
     /// Returns the kind of a return.
-    #[inline]
+    #[inline(always)]
     pub fn of(rig: &Rig, point: &Point) -> ReturnKind {
-        let p = point.position;
-        if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
+        let ([x, y, z], offset_s) = (point.position, point.offset_s);
+        // Without a branch per number: almost all are finite.
+        let is_finite = x.is_finite() & y.is_finite() & z.is_finite() & offset_s.is_finite();
+        if !is_finite {
             ReturnKind::NotFinite
-        } else if p == [0.0; 3] {
+        } else if x == 0.0 && y == 0.0 && z == 0.0 {
             ReturnKind::NoEcho
         } else if point.sensor as usize >= rig.sensors.len() {
             ReturnKind::UnknownSensor
-        } else if rig.is_own_vehicle(p) {
+        } else if rig.is_own_vehicle(point.position) {
             ReturnKind::OwnVehicle
         } else {
             ReturnKind::Valid
@@ -79,6 +81,7 @@ impl DroppedReturns {
 
     /// Returns whether a valid return lies on the ego vehicle (not counted here); counts an invalid
     /// one and returns `None`.
+    #[inline(always)]
     pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
         match ReturnKind::of(rig, point) {
             ReturnKind::Valid => return Some(false),

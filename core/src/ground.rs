@@ -121,13 +121,16 @@ impl GroundEstimator {
         let length = |metres: f64| (metres / column_m) as f32;
         let drop = length(params.ground_drop_m);
         let returns = returns.filter(|(_, p)| {
-            let away = (p[0] - under[0]).abs().max((p[1] - under[1]).abs());
+            // Not `max`, nor `min` below: to be right for NaN they take several times as long.
+            let [x, y] = [(p[0] - under[0]).abs(), (p[1] - under[1]).abs()];
+            let away = if x > y { x } else { y };
             p[2] >= under[2] - drop - params.ground_drop_slope * away
         });
         self.lowest.fill([f32::INFINITY; 3]);
         self.low[..side * side].fill(f32::INFINITY);
         for (column, [_, _, z]) in returns.clone() {
-            self.low[column] = self.low[column].min(z);
+            let low = &mut self.low[column];
+            *low = if z < *low { z } else { *low };
             self.lower(column, z);
         }
         let fall = (params.ground_fall_slope * edge as f64) as f32;

@@ -54,6 +54,15 @@ pub struct DetailedCloud<'a> {
     pub detail: &'a CloudDetail,
 }
 
+/// A place whose nearest return of a sensor is sought.
+struct Sought {
+    at: [f32; 3],
+    sensor: u32,
+    /// The column after the one it lies in, and its distance from the lower edge of the latter.
+    j: i32,
+    in_column: f32,
+}
+
 impl Deref for DetailedCloud<'_> {
     type Target = Cloud;
 
@@ -176,30 +185,46 @@ impl Cloud {
         // A place up to one voxel outside the window still has neighbours inside. Signed, because
         // converting floats to unsigned integers and back takes several times as many instructions.
         let [x, y] = [at[0] + 1.0, at[1] + 1.0];
-        let ([i, j], side) = ([x, y].map(integer_part), self.side as i32);
+        let [i, j] = [x, y].map(integer_part);
         let (in_row, in_column) = (x - i as f32, y - j as f32);
-        let (j_from, j_to) = ((j - 2).max(0), (j + 1).min(side));
+        let sought = Sought { at, sensor, j, in_column };
         let mut nearest = Nearest::within(reach * reach);
-        let mut least = reach * reach;
+        let least = reach * reach;
         // The row it lies in first: what is found there often rules out the others.
-        for (row, gap) in [(i - 1, 0.0), (i - 2, in_row), (i, 1.0 - in_row)] {
-            if row < 0 || row >= side || gap * gap >= least {
-                continue;
-            }
-            // A column this far off cannot hold a nearer return.
-            let left = gap * gap + in_column * in_column < least;
-            let right = gap * gap + (1.0 - in_column) * (1.0 - in_column) < least;
-            let from = if left { j_from } else { (j - 1).max(j_from) };
-            let to = if right { j_to } else { j.min(j_to) };
-            let [row, from, to] = [row, from, to.max(from)].map(|at| at as usize);
-            let row = self.row(row, from, to);
-            self.thinned.places.look(row, at, sensor, &mut nearest);
-            least = nearest.squared_distance();
-            if least < enough * enough {
-                break;
+        let least = self.look_in_row(i - 1, 0.0, &sought, least, &mut nearest);
+        if least >= enough * enough {
+            let least = self.look_in_row(i - 2, in_row, &sought, least, &mut nearest);
+            if least >= enough * enough {
+                self.look_in_row(i, 1.0 - in_row, &sought, least, &mut nearest);
             }
         }
         nearest.found()
+    }
+
+    /// Looks in a row, whose edge is `gap` away. Returns the squared distance of the nearest return
+    /// so far.
+    #[inline(always)]
+    fn look_in_row(
+        &self,
+        row: i32,
+        gap: f32,
+        sought: &Sought,
+        least: f32,
+        nearest: &mut Nearest,
+    ) -> f32 {
+        let (side, &Sought { at, sensor, j, in_column }) = (self.side as i32, sought);
+        if row < 0 || row >= side || gap * gap >= least {
+            return least;
+        }
+        let (j_from, j_to) = ((j - 2).max(0), (j + 1).min(side));
+        // A column this far off cannot hold a nearer return.
+        let left = gap * gap + in_column * in_column < least;
+        let right = gap * gap + (1.0 - in_column) * (1.0 - in_column) < least;
+        let from = if left { j_from } else { (j - 1).max(j_from) };
+        let to = if right { j_to } else { j.min(j_to) };
+        let [row, from, to] = [row, from, to.max(from)].map(|at| at as usize);
+        self.thinned.places.look(self.row(row, from, to), at, sensor, nearest);
+        nearest.squared_distance()
     }
 
     /// A return.
