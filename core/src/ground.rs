@@ -121,7 +121,8 @@ impl GroundEstimator {
         let length = |metres: f64| (metres / column_m) as f32;
         let drop = length(params.ground_drop_m);
         let returns = returns.filter(|(_, p)| {
-            // Not `max`, nor `min` below: to be right for NaN they take several times as long.
+            // Comparisons rather than `max` here and `min` in the loop below: no position is NaN,
+            // and being right for NaN takes several times as many instructions.
             let [x, y] = [(p[0] - under[0]).abs(), (p[1] - under[1]).abs()];
             let away = if x > y { x } else { y };
             p[2] >= under[2] - drop - params.ground_drop_slope * away

@@ -41,7 +41,7 @@ fn columns(random: &mut Random, side: usize) -> Vec<Column> {
     (0..side * side).map(|_| one(random)).collect()
 }
 
-/// With this instruction set.
+/// A team of one thread with this instruction set.
 struct OneThread(Simd);
 
 impl Team for OneThread {
@@ -62,10 +62,11 @@ fn encoded(
     side: usize,
     corner: [i32; 2],
 ) -> Vec<ColumnScores> {
-    let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
-    encoder.set_weights(Some(weights));
-    encoder.keep(columns, side, corner);
-    let mut scores_with = |simd| {
+    // A new one each time: nothing is left of an earlier result.
+    let scores_with = |simd| {
+        let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
+        encoder.set_weights(Some(weights));
+        encoder.keep(columns, side, corner);
         encoder.encode(&OneThread(simd));
         encoder.scores().to_vec()
     };

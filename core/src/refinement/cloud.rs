@@ -58,8 +58,9 @@ pub struct DetailedCloud<'a> {
 struct Sought {
     at: [f32; 3],
     sensor: u32,
-    /// The column after the one it lies in, and its distance from the lower edge of the latter.
+    /// The column after the one it lies in.
     j: i32,
+    /// How far it is from the lower edge of the column it lies in.
     in_column: f32,
 }
 
@@ -189,12 +190,13 @@ impl Cloud {
         let (in_row, in_column) = (x - i as f32, y - j as f32);
         let sought = Sought { at, sensor, j, in_column };
         let mut nearest = Nearest::within(reach * reach);
-        let least = reach * reach;
+        // Within reach: as long as nothing is found, nothing is near enough.
+        let (least, enough) = (reach * reach, enough.min(reach) * enough.min(reach));
         // The row it lies in first: what is found there often rules out the others.
         let least = self.look_in_row(i - 1, 0.0, &sought, least, &mut nearest);
-        if least >= enough * enough {
+        if least >= enough {
             let least = self.look_in_row(i - 2, in_row, &sought, least, &mut nearest);
-            if least >= enough * enough {
+            if least >= enough {
                 self.look_in_row(i, 1.0 - in_row, &sought, least, &mut nearest);
             }
         }

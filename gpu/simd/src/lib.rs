@@ -28,7 +28,7 @@ enum Width {
     Avx512,
 }
 
-/// What [`Width::Avx2`] is compiled for: x86-64-v3 without fused multiply-adds.
+/// What [`Width::Avx2`] is compiled for: x86-64-v3 without FMA, F16C and MOVBE.
 #[cfg(all(target_arch = "x86_64", feature = "detect"))]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn avx2<R>(work: impl FnOnce(Simd) -> R) -> R {

@@ -33,8 +33,8 @@ pub fn ray_trace(
 
 /// Number of rays looked up at once.
 const BATCH: usize = 64;
-/// Number of steps of a walk computed at once: those of a vector of AVX2. Not
-/// measured otherwise, nor with wider vectors.
+/// Number of steps of a walk computed at once: those of a vector of AVX2. Other numbers, and wider
+/// vectors, were not measured.
 const LANES: usize = 8;
 /// Bits of the part of a voxel that a walk has gone along an axis: as many as leave room for the
 /// voxels of [`LANES`] steps. They decide exactly where a voxel ends: those places are at least
