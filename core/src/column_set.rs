@@ -2,13 +2,6 @@
 
 use crate::params::COLUMNS_MAX;
 
-/// The columns at most `reach` from a column along each axis, itself included, in a window of
-/// `side` by `side`; ascending.
-pub fn columns_near(column: usize, reach: usize, side: usize) -> impl Iterator<Item = usize> {
-    let near = move |at: usize| at.saturating_sub(reach)..(at + reach + 1).min(side);
-    near(column / side).flat_map(move |i| near(column % side).map(move |j| i * side + j))
-}
-
 /// A set of columns, one bit each: small enough for the stack.
 pub struct ColumnSet([u64; COLUMNS_MAX.div_ceil(64)]);
 

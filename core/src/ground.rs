@@ -7,7 +7,8 @@
 //!
 //! Parameters are in metres; positions and heights are in the caller's unit, the edge of a column.
 
-use crate::column_set::{ColumnSet, columns_near};
+use crate::column_set::ColumnSet;
+use crate::neighbours::columns_near;
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
 use core::ops::Range;
 

@@ -49,6 +49,7 @@ pub mod groups;
 pub mod map;
 #[cfg(feature = "pipeline")]
 pub mod motion_compensation;
+mod neighbours;
 #[cfg(feature = "pipeline")]
 pub mod output;
 pub mod params;

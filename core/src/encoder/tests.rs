@@ -4,7 +4,7 @@ extern crate std;
 use super::*;
 use crate::digest::Digest;
 use crate::random::Random;
-use crate::team::Team;
+use crate::team::{SingleThread, Team};
 use raywake_simd::Simd;
 use std::fmt::Write;
 use std::string::String;
@@ -46,8 +46,7 @@ struct OneThread(Simd);
 
 impl Team for OneThread {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-        a();
-        b();
+        SingleThread.join(a, b);
     }
 
     fn simd(&self) -> Simd {

@@ -6,7 +6,8 @@ use super::cues::Prediction;
 use super::hypothesis::{self, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
-use crate::column_set::{ColumnSet, columns_near};
+use crate::column_set::ColumnSet;
+use crate::neighbours::columns_near;
 use crate::record::NONE;
 
 /// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.

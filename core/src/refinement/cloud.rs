@@ -191,32 +191,25 @@ impl Cloud {
         let sought = Sought { at, sensor, j, in_column };
         let mut nearest = Nearest::within(reach * reach);
         // Within reach: as long as nothing is found, nothing is near enough.
-        let (least, enough) = (reach * reach, enough.min(reach) * enough.min(reach));
+        let enough = enough.min(reach) * enough.min(reach);
         // The row it lies in first: what is found there often rules out the others.
-        let least = self.look_in_row(i - 1, 0.0, &sought, least, &mut nearest);
-        if least >= enough {
-            let least = self.look_in_row(i - 2, in_row, &sought, least, &mut nearest);
-            if least >= enough {
-                self.look_in_row(i, 1.0 - in_row, &sought, least, &mut nearest);
-            }
+        self.look_in_row(i - 1, 0.0, &sought, &mut nearest);
+        if nearest.squared_distance() >= enough {
+            self.look_in_row(i - 2, in_row, &sought, &mut nearest);
+        }
+        if nearest.squared_distance() >= enough {
+            self.look_in_row(i, 1.0 - in_row, &sought, &mut nearest);
         }
         nearest.found()
     }
 
-    /// Looks in a row, whose edge is `gap` away. Returns the squared distance of the nearest return
-    /// so far.
+    /// Looks in a row, whose edge is `gap` away.
     #[inline(always)]
-    fn look_in_row(
-        &self,
-        row: i32,
-        gap: f32,
-        sought: &Sought,
-        least: f32,
-        nearest: &mut Nearest,
-    ) -> f32 {
+    fn look_in_row(&self, row: i32, gap: f32, sought: &Sought, nearest: &mut Nearest) {
         let (side, &Sought { at, sensor, j, in_column }) = (self.side as i32, sought);
+        let least = nearest.squared_distance();
         if row < 0 || row >= side || gap * gap >= least {
-            return least;
+            return;
         }
         let (j_from, j_to) = ((j - 2).max(0), (j + 1).min(side));
         // A column this far off cannot hold a nearer return.
@@ -226,7 +219,6 @@ impl Cloud {
         let to = if right { j_to } else { j.min(j_to) };
         let [row, from, to] = [row, from, to.max(from)].map(|at| at as usize);
         self.thinned.places.look(self.row(row, from, to), at, sensor, nearest);
-        nearest.squared_distance()
     }
 
     /// A return.

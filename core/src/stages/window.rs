@@ -2,9 +2,9 @@
 //! the source, as the author programmed it. They are computed on demand and never stored: a table
 //! of them would be as large as that of the pairs.
 
+use crate::neighbours::rows_near;
 use crate::params::{COST_UNKNOWN, LINE, REACH, ROW, SIDE};
 use crate::record::{MinCost, NONE, SweepUniform};
-use core::ops::Range;
 
 /// Costs of a column at its displacements, ordered as in [`ROW`].
 pub trait Costs {
@@ -52,7 +52,7 @@ impl<'a> WindowCosts<'a> {
                 let _ = costs.rows.push(&rows_of_pairs[n as usize]);
             }
         };
-        for row in rows_around(sweep, column, 1) {
+        for row in rows_near(column, 1, sweep.side as u32) {
             foreground_index[row].iter().for_each(|index| add(*index));
         }
         costs
@@ -132,19 +132,6 @@ pub fn outside_cost(sweep: &SweepUniform, column: usize) -> i32 {
     let side = sweep.side;
     let inside = |at: i32| 1 + i32::from(at > 0) + i32::from(at + 1 < side);
     (9 - inside(column as i32 / side) * inside(column as i32 % side)) * sweep.outside_cost
-}
-
-/// The columns of the window at most `reach` from one along each axis, itself included, row by row.
-#[inline(always)]
-pub fn rows_around(
-    sweep: &SweepUniform,
-    column: u32,
-    reach: u32,
-) -> impl Iterator<Item = Range<usize>> {
-    let side = sweep.side as u32;
-    let around = |at: u32| at.saturating_sub(reach)..(at + reach + 1).min(side);
-    let (rows, across) = (around(column / side), around(column % side));
-    rows.map(move |i| (i * side + across.start) as usize..(i * side + across.end) as usize)
 }
 
 #[cfg(test)]

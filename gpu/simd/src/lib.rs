@@ -4,9 +4,8 @@
 //! function compiled again, for AVX2 and for AVX-512, if the processor has those;
 //! [`Simd::add_products`] is written for them by hand, in integers. Only the width differs: no sum
 //! is taken in another order and nothing is contracted to a fused multiply-add, so that every bit
-//! of a result is the same. On aarch64 the baseline is NEON. With AVX-512 a sweep takes 2 % less
-//! time than with AVX2 on one core, and 4 % less on two (KITTI drive 0005, scalar, an AMD EPYC,
-//! Zen 5: medians of three alternating runs of commit f75aafa). It was not measured on Intel.
+//! of a result is the same. On aarch64 the baseline is NEON. `RESULTS.md` has what AVX-512
+//! saves.
 
 #![no_std]
 #![deny(missing_docs)]
@@ -28,21 +27,35 @@ enum Width {
     Avx512,
 }
 
-/// What [`Width::Avx2`] is compiled for: x86-64-v3 without FMA, F16C and MOVBE.
+/// Declares an instruction set by its features: whether the processor has them, and a function that
+/// is compiled for them.
 #[cfg(all(target_arch = "x86_64", feature = "detect"))]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn avx2<R>(work: impl FnOnce(Simd) -> R) -> R {
-    work(Simd(Width::Avx2))
+macro_rules! compiled_for {
+    ($name:ident, $width:ident: $($feature:tt)+) => {
+        mod $name {
+            use super::{Simd, Width};
+
+            pub(super) fn is_available() -> bool {
+                true $(&& std::is_x86_feature_detected!($feature))+
+            }
+
+            #[target_feature($(enable = $feature),+)]
+            pub(super) fn run<R>(work: impl FnOnce(Simd) -> R) -> R {
+                work(Simd(Width::$width))
+            }
+        }
+    };
 }
 
-/// What [`Width::Avx512`] is compiled for: x86-64-v4 and products of 16-bit integers. That includes
-/// fused multiply-adds, but compilers contract nothing to them unless told to.
+// x86-64-v3 without FMA, F16C and MOVBE.
 #[cfg(all(target_arch = "x86_64", feature = "detect"))]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-#[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx512vnni")]
-fn avx512<R>(work: impl FnOnce(Simd) -> R) -> R {
-    work(Simd(Width::Avx512))
-}
+compiled_for!(avx2, Avx2: "avx2" "bmi1" "bmi2" "lzcnt" "popcnt");
+
+// x86-64-v4 without MOVBE, and products of 16-bit integers. AVX-512 includes fused multiply-adds,
+// but compilers contract nothing to them unless told to.
+#[cfg(all(target_arch = "x86_64", feature = "detect"))]
+compiled_for!(avx512, Avx512: "avx2" "bmi1" "bmi2" "lzcnt" "popcnt" "fma" "f16c" "avx512f"
+    "avx512bw" "avx512cd" "avx512dq" "avx512vl" "avx512vnni");
 
 impl Simd {
     /// What every processor of this architecture has.
@@ -52,16 +65,7 @@ impl Simd {
     #[cfg(feature = "detect")]
     pub fn available() -> impl DoubleEndedIterator<Item = Simd> {
         #[cfg(target_arch = "x86_64")]
-        let wide = {
-            use std::is_x86_feature_detected as has;
-            let bits = has!("bmi1") && has!("bmi2") && has!("lzcnt") && has!("popcnt");
-            let avx2 = bits && has!("avx2");
-            let v3 = avx2 && has!("fma") && has!("f16c");
-            let v4 =
-                v3 && has!("avx512f") && has!("avx512bw") && has!("avx512cd") && has!("avx512dq");
-            let avx512 = v4 && has!("avx512vl") && has!("avx512vnni");
-            [(avx2, Width::Avx2), (avx512, Width::Avx512)]
-        };
+        let wide = [(avx2::is_available(), Width::Avx2), (avx512::is_available(), Width::Avx512)];
         #[cfg(not(target_arch = "x86_64"))]
         let wide = [];
         let wide = wide.into_iter().filter_map(|(has, width)| bool::then_some(has, Simd(width)));
@@ -121,10 +125,10 @@ impl Simd {
             Width::Baseline => work(Simd::BASELINE),
             // SAFETY: the processor has them, see `Simd`.
             #[cfg(all(target_arch = "x86_64", feature = "detect"))]
-            Width::Avx2 => unsafe { avx2(work) },
+            Width::Avx2 => unsafe { avx2::run(work) },
             // SAFETY: likewise.
             #[cfg(all(target_arch = "x86_64", feature = "detect"))]
-            Width::Avx512 => unsafe { avx512(work) },
+            Width::Avx512 => unsafe { avx512::run(work) },
         }
     }
 }

@@ -98,7 +98,7 @@ mod wide {
     // 4 to 12 of the 16 registers, beside the inputs and a weight. Others were not measured.
     products!(avx2, "avx2", cells: [4, 4, 2, 2, 2], add: madd);
 
-    // 8 to 24 of the 32 registers. With half as many cells, the encoder takes 4 % longer (KITTI
+    // 8 to 24 of the 32 registers. With half as many cells, the encoder takes 3 % longer (KITTI
     // drive 0005, one core of an AMD EPYC, Zen 5). 24 sums do not fill vectors twice as wide.
     products!(
         avx512,

@@ -1,11 +1,12 @@
 //! Expectation by rings: run by the scalar backend, and by devices that are CPUs.
 
 use super::expectation::displacement;
+use crate::neighbours::rows_near;
 use crate::params::{LINE, REACH, ROW};
 use crate::record::{
     Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement, pack_flow,
 };
-use crate::stages::window::{Costs, WindowCosts, outside_cost, rows_around};
+use crate::stages::window::{Costs, WindowCosts, outside_cost};
 
 /// [`expectation`](super::expectation::expectation) without examining everything: see [`propose`].
 #[expect(clippy::too_many_arguments, reason = "one for every buffer")]
@@ -75,7 +76,7 @@ impl Sums {
     #[inline(always)]
     fn of(sweep: &SweepUniform, flow: &[Flow], column: u32) -> Sums {
         let mut n = Sums { count: 0, sum: [0; 2], squares: 0 };
-        for row in rows_around(sweep, column, 2) {
+        for row in rows_near(column, 2, sweep.side as u32) {
             let around = &flow[row];
             // Mostly five: a loop of known length is unrolled.
             match around.as_array::<5>() {
