@@ -92,11 +92,11 @@ impl Pipeline {
         if let Some(pair) = self.sides.pair(profile) {
             let left = self.refine(team, &pair, &sent.uniform, &perceived);
             timer.lap("refine");
-            let turnover = self.track(&pair, &sent.uniform, &perceived, left);
+            let turnover = self.track(setup, &pair, &sent.uniform, &perceived, left);
             timer.lap("track");
             let found = Found {
                 pair: &pair,
-                rig: &setup.rig,
+                setup,
                 sweep: &sent.uniform,
                 perceived: &perceived,
                 observations: &self.observations,
@@ -140,13 +140,14 @@ impl Pipeline {
     /// Updates the tracklets with the displacements of columns.
     fn track(
         &mut self,
+        setup: &Setup,
         pair: &SweepPair,
         sweep: &SweepUniform,
         perceived: &Perceived,
         left: u32,
     ) -> TrackletTurnover {
         let (profile, observed) = (pair.profile, &mut self.observations);
-        observed.collect(profile, sweep, perceived, &self.refinement);
+        observed.collect(setup, sweep, perceived, &self.refinement);
         let (dt, turned) = (pair.dt_s as f32, pair.turned_rad);
         self.tracklets.update(profile, sweep, dt, turned, left, &mut observed.all)
     }

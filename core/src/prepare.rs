@@ -10,6 +10,7 @@ use crate::frame::{Window, central};
 use crate::params::{ORIGINS_MAX, Profile, SENSORS_MAX, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
+use crate::refinement::forest::MovesForest;
 use crate::return_clock::ReturnClock;
 use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
@@ -32,6 +33,8 @@ pub struct Setup {
     pub rig: Rig,
     /// Range of the constancy classifier's scores.
     pub scores: Scores,
+    /// Turns cues into P(moves).
+    pub moves: MovesForest,
     /// Whether every solid column is foreground.
     pub unfiltered: bool,
     /// Turns sweeps into rays.

@@ -4,12 +4,14 @@ use crate::dropped::ReturnKind;
 use crate::encoder::{ColumnClass, ColumnScores, class_of};
 use crate::frame::{SweepPair, centre_of};
 use crate::output::{ColumnFlow, FlowBasis, Output, PairFlows, PointFlows, ReturnFlow, Status};
-use crate::params::COLUMNS_MAX;
+use crate::params::{COLUMNS_MAX, Profile};
 use crate::perceive::Perceived;
+use crate::prepare::Setup;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
 use crate::refinement::Refinement;
+use crate::refinement::cues::Cues;
 use crate::returns::Returns;
-use crate::sweep::{Point, Rig};
+use crate::sweep::Point;
 use crate::team::{self, Team};
 use crate::thinning::TakenPoints;
 use crate::tracklet::observe::Observations;
@@ -33,7 +35,7 @@ impl FlowOfColumn {
 /// Everything known about a pair of sweeps.
 pub(crate) struct Found<'a> {
     pub pair: &'a SweepPair<'a>,
-    pub rig: &'a Rig,
+    pub setup: &'a Setup,
     pub sweep: &'a SweepUniform,
     pub perceived: &'a Perceived<'a>,
     pub observations: &'a Observations,
@@ -99,7 +101,7 @@ impl Found<'_> {
                 flow.age = tracklet.map_or(0, |t| t.age);
                 (flow.probability, flow.cues) = (o.probability, o.cues);
                 self.pair.set_motion(at, o, tracklet, &mut flow);
-                if !self.moves(o.probability) {
+                if !self.moves(&o.cues, o.probability) {
                     self.pair.set_static(at, &mut flow);
                 }
             } else {
@@ -137,10 +139,10 @@ impl Found<'_> {
                 continue;
             }
             let Some(found) = self.refinement.at(column) else { continue };
-            let probability = found.cues.probability(&self.pair.profile.moves);
+            let probability = self.setup.moves.probability(&found.cues);
             let mut flow =
                 ColumnFlow { basis: FlowBasis::Joined, probability, ..Default::default() };
-            if self.moves(probability) {
+            if self.moves(&found.cues, probability) {
                 flow.velocity_world_mps = found.by.map(|v| v * r / dt);
                 flow.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
             }
@@ -164,11 +166,12 @@ impl Found<'_> {
         inside.then_some((i * side + j) as usize)
     }
 
-    /// Whether something with this P(moves) is output as moving. Whole cells have no other
-    /// evidence.
-    fn moves(&self, probability: f32) -> bool {
-        let profile = self.pair.profile;
-        profile.refinement_sweeps == 0 || probability >= profile.moves.moves_min
+    /// Whether something with these cues and this P(moves) is output as moving. Whole cells have no
+    /// other evidence.
+    fn moves(&self, cues: &Cues, probability: f32) -> bool {
+        let Profile { refinement_sweeps, moves, .. } = self.pair.profile;
+        let first = if cues.no_history { moves.moves_min_first } else { 0.0 };
+        *refinement_sweeps == 0 || probability >= moves.moves_min.max(first)
     }
 
     /// The record of a column whose centre is at `at` in the first sweep's vehicle frame.
@@ -226,7 +229,7 @@ impl Found<'_> {
     /// The status of a return, given the flow of its column.
     #[inline]
     fn status(&self, column: u32, point: &Point, flow: Option<&ColumnFlow>) -> Status {
-        match ReturnKind::of(self.rig, point) {
+        match ReturnKind::of(&self.setup.rig, point) {
             ReturnKind::Valid if column == NONE => Status::OutsideWindow,
             ReturnKind::Valid => flow.map_or(Status::Static, |flow| match flow.basis {
                 FlowBasis::Unmatched => Status::Unmatched,

@@ -231,6 +231,9 @@ pub struct Learned {
     /// Encoder weights; `none` refines without the classes of the columns
     #[arg(long, value_name = "FILE|none")]
     pub encoder: Option<PathBuf>,
+    /// Weights of P(moves), the probability that a column moves
+    #[arg(long, value_name = "FILE")]
+    pub moves: Option<PathBuf>,
 }
 
 /// Where the grid and flow stages run.

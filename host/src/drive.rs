@@ -189,6 +189,7 @@ impl Parts {
                 profile: profile.clone(),
                 rig: rig.clone(),
                 scores: tables.scores,
+                moves: tables.moves,
                 unfiltered: tables.unfiltered,
                 preparation: Preparation::new(),
             },

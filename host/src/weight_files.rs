@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use raywake_core::digest::Digest;
 use raywake_core::encoder;
 use raywake_core::params::Profile;
+use raywake_core::refinement::forest;
 use raywake_core::stages::background_filter;
 use raywake_core::stages::occupancy_constancy;
 
@@ -21,6 +22,7 @@ pub struct WeightFiles {
     constancy: WeightFile,
     /// `None`: nothing is encoded.
     encoder: Option<WeightFile>,
+    moves: WeightFile,
 }
 
 #[derive(Clone)]
@@ -47,6 +49,7 @@ impl WeightFiles {
             filter: optional(&learned.filter, background_filter::shipped(frame))?,
             constancy: file(&learned.constancy, occupancy_constancy::shipped(frame))?,
             encoder: optional(&learned.encoder, encoder::SHIPPED)?,
+            moves: file(&learned.moves, forest::SHIPPED)?,
         })
     }
 
@@ -79,7 +82,7 @@ impl WeightFiles {
     pub fn digest(&self) -> String {
         let filter = self.filter.as_ref().map(|f| &f.text);
         let encoder = self.encoder.as_ref().map(|f| &f.text);
-        let all = format!("{filter:?}{}{encoder:?}", self.constancy.text);
+        let all = format!("{filter:?}{}{encoder:?}{}", self.constancy.text, self.moves.text);
         format!("{:016x}", Digest::of(all.as_bytes()))
     }
 
@@ -88,7 +91,7 @@ impl WeightFiles {
     pub fn tables(&self, profile: &Profile) -> Result<Tables, Error> {
         let filter = self.filter.as_ref().map(|f| f.text.as_str());
         let encoder = self.encoder.as_ref().map(|f| f.text.as_str());
-        Tables::load(profile, filter, &self.constancy.text, encoder)
+        Tables::load(profile, filter, &self.constancy.text, encoder, &self.moves.text)
             .map_err(|e| self.mistake(profile, e))
     }
 
@@ -97,6 +100,7 @@ impl WeightFiles {
             LearnedPart::Filter => (self.filter.as_ref(), "--filter"),
             LearnedPart::Constancy => (Some(&self.constancy), "--constancy"),
             LearnedPart::Encoder => (self.encoder.as_ref(), "--encoder"),
+            LearnedPart::Moves => (Some(&self.moves), "--moves"),
         };
         match file.and_then(|f| f.path.as_ref()) {
             Some(path) => Error::input(path, "", e.to_string()),

@@ -4,6 +4,7 @@ use raywake::backend::device::Device;
 use raywake::backend::{Backend, Tables};
 use raywake_core::params::Profile;
 use raywake_core::pipeline::Pipeline;
+use raywake_core::refinement::forest;
 use raywake_core::stages::background_filter;
 use raywake_gpu::Options;
 use raywake_tests::drives::{Setup, pairs, street};
@@ -79,7 +80,9 @@ fn windows_of_other_sizes() {
     let setup = Setup::new(profile, Some(weights::filter(41, 16, 100, 0)));
     // The shipped classifier has 14 levels, so another one is used for 16.
     let text = weights::constancy(42, 16, 150);
-    let tables = Tables::load(&setup.profile, setup.filter.as_deref(), &text, None).expect("set");
+    let tables =
+        Tables::load(&setup.profile, setup.filter.as_deref(), &text, None, forest::SHIPPED)
+            .expect("set");
     let device = Device::new(&setup.profile, &tables, &Options::default());
     let Some(device) = raywake_tests::vulkan::expect(device) else { return };
     let scalar = Backend::scalar(&setup.profile, &tables);

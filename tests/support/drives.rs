@@ -4,6 +4,7 @@ use raywake::backend::device::Device;
 use raywake::backend::{Backend, Tables};
 use raywake_core::encoder;
 use raywake_core::params::Profile;
+use raywake_core::refinement::forest;
 use raywake_core::stages::occupancy_constancy;
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_gpu::Options;
@@ -34,8 +35,14 @@ impl Setup {
     /// The learned tables.
     pub fn tables(&self) -> Tables {
         let constancy = occupancy_constancy::shipped(self.profile.frame);
-        Tables::load(&self.profile, self.filter.as_deref(), constancy, Some(encoder::SHIPPED))
-            .unwrap_or_else(|e| panic!("{e}"))
+        Tables::load(
+            &self.profile,
+            self.filter.as_deref(),
+            constancy,
+            Some(encoder::SHIPPED),
+            forest::SHIPPED,
+        )
+        .unwrap_or_else(|e| panic!("{e}"))
     }
 
     /// The scalar backend.

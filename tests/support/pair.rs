@@ -93,6 +93,7 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
             profile: setup.profile.clone(),
             rig: setup.rig.clone(),
             scores: tables.scores,
+            moves: tables.moves,
             unfiltered: tables.unfiltered,
             preparation: Preparation::new(),
         };

@@ -18,8 +18,8 @@ pub const SOLID_MAX: usize = 32_768;
 /// counted. Eight times enough for every sweep seen, in a 100 m window too.
 pub const CLUSTERS_MAX: usize = 8192;
 /// Foreground columns of one sweep; further ones, in column order, are dropped and counted.
-/// The busiest sweep seen has 8,795 solid columns in a 50 m window.
-pub const FOREGROUND_MAX: usize = 12_288;
+/// The busiest drives seen have 5,800 on average in a 100 m window (`--profile far`).
+pub const FOREGROUND_MAX: usize = 10_240;
 /// Time slots a sweep is divided into for ray origins and motion correction: 1.6 ms at 10 Hz.
 pub const SLOTS: usize = 64;
 /// Sensors a rig may have.
@@ -48,8 +48,8 @@ pub const MERGE_PROBES: u32 = 64;
 pub const EXTENT_VOXELS: i32 = 4095;
 /// Maximum number of voxels for which a ray may be traced.
 pub const RANGE_STEPS_MAX: i32 = 2000;
-/// Maximum number of sweeps that the refinement of the flow may use.
-pub const REFINEMENT_SWEEPS_MAX: usize = 5;
+/// Maximum number of sweeps that the refinement of the flow may remember.
+pub const REFINEMENT_SWEEPS_MAX: usize = 7;
 /// Maximum number of levels above the ground in a cluster: those of a column share one 32-bit word.
 pub const CLUSTER_LEVELS_MAX: usize = 32;
 /// Sub-voxels along an axis of a voxel, each of which keeps one return.

@@ -142,6 +142,8 @@ crate::params! {
              simulated streets (`raywake-lab sim --drives 3 --sweeps 25 --seed 9001`; slow and \
              plain, `vlp32x2`): 91.0 and 97.4 % at -4, 91.9 and 97.7 here, 91.5 and 97.8 at -8, \
              each with its own weights.";
+        /// Scores that P(moves) goes by are cut to this either way: beyond it the case is clear.
+        pub could_move_max: f32 = 4.0, "nat", (0 to 8), "Not measured in isolation.";
         /// Columns whose score is above this and that touch a moving cluster join it if they fit
         /// its motion about as well as rest (`remainder_residual`).
         pub body_min: f32 = 1.0, "nat", (-8 to 8),
@@ -198,7 +200,8 @@ crate::params! {
         /// A start is first tried with every k-th return.
         pub start_stride: u32 = 3, "returns", (1 to 96), SIMULATED;
 
-        /// Minimum mean residual at rest of a column that may belong to a moving part.
+        /// Minimum mean residual at rest, in the second sweep or in the earliest, of a column that
+        /// may belong to a moving part.
         pub column_residual: f32 = 0.15, "", (0 to 1), SIMULATED;
         /// Returns of a column examined for that.
         pub column_returns: u32 = 4, "returns", (1 to 1000), SIMULATED;
@@ -207,8 +210,9 @@ crate::params! {
         pub part_since_s: f64 = 0.25, "s", (0 to 10),
             "Columns of walking people on `kitti_raw_0005` (94), found with a margin of 0: 14 at \
              10 s, where nothing is remembered, 26 at 0.15 s, 37 here, 33 at 0.4 s.";
-        /// How much the evidence of such a part must exceed what the test requires: anything that
-        /// comes out of a shadow was not there before either.
+        /// How much the evidence of such a part, or of one that fits badly in the earliest sweep
+        /// only, must exceed what the test requires: what comes out of a shadow was not there
+        /// before either.
         pub part_since_margin: f32 = 0.1, "", (0 to 1),
             "Columns true / false of two simulated drives (`raywake-lab sim --drives 2 --sweeps 20 \
              --seed 1100`): 9,073 / 318 without such parts, 9,073 / 397 at 0, 9,073 / 320 here. Of \

@@ -79,12 +79,16 @@ impl CloudRing {
         (self.held >= 2).then(|| self.second().stamp_s - self.first().stamp_s)
     }
 
-    /// What clusters of the first sweep are compared with: the second sweep and every other sweep
-    /// before that.
+    /// What clusters of the first sweep are compared with: the pair's second sweep and, if the ring
+    /// reaches that far back, the last sweep before the pair and the oldest.
     pub fn targets(&self, span_s: f64) -> Targets<'_> {
         let first = self.first();
-        let ages = (0..self.held).step_by(2).map(|age| self.of_age(age).cloud);
-        ages.enumerate()
+        let ages = [0, 2, self.held.saturating_sub(1)];
+        let known = ages.len().min(self.held.saturating_sub(1));
+        ages[..known]
+            .iter()
+            .map(|age| self.of_age(*age).cloud)
+            .enumerate()
             .map(|(index, cloud)| Target {
                 index,
                 cloud,

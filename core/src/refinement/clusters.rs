@@ -54,8 +54,8 @@ impl Clusters {
         let of_column = self.column_cues.get(column).unwrap_or(&ColumnCues::NONE);
         match self.of(column) {
             Some(found) if found.is_dynamic => found.cues.with(*of_column),
-            Some(found) => Cues::stationary(found.cues.share, of_column.could_move),
-            None => Cues::stationary(0.0, 0.0),
+            Some(found) => Cues::stationary(&found.cues, of_column.could_move),
+            None => Cues::stationary(&Cues::NONE, 0.0),
         }
     }
 
@@ -91,8 +91,15 @@ impl Clusters {
             flow(c) & VALID != 0
                 && scans.column_residual(c, |s| scans.static_residual(s)) > params.column_residual
         });
-        // Someone walking beside a wall moves by less than a column from sweep to sweep.
-        self.find_moving_parts(team, scans, flow, predicted, params.part_since_margin, |c| {
+        // Someone walking beside a wall moves by less than a column from sweep to sweep: in the
+        // earliest sweep it fits badly, or nothing was there.
+        let margin = params.part_since_margin;
+        self.find_moving_parts(team, scans, flow, predicted, margin, |c| {
+            flow(c) & VALID != 0
+                && !scans.stays(c)
+                && scans.early_residual(c) > params.column_residual
+        });
+        self.find_moving_parts(team, scans, flow, predicted, margin, |c| {
             !scans.stays(c) && scans.history.is_new(scans.first, c, params.part_since_s)
         });
         self.find_earlier_hits(scans);
@@ -106,14 +113,14 @@ impl Clusters {
         self.include_ground(scans);
         self.find_earlier_hits(scans);
         self.found.iter_mut().for_each(|f| f.cues.no_history = scans.history.is_short());
-        let (of_column, found) = (&self.of_column, &self.found);
+        let (of_column, found, most) = (&self.of_column, &self.found, params.could_move_max);
         let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);
             // A cluster that neither moves nor did before provides no cues.
             let found = found.filter(|f| f.is_dynamic || f.cues.share > 0.0);
             found.map_or(ColumnCues::NONE, |f| ColumnCues {
                 misfit: scans.misfit(c, &f.motion),
-                could_move: f.could_move(&scans, c),
+                could_move: f.could_move(&scans, c).clamp(-most, most),
             })
         };
         let side = scans.first.side;

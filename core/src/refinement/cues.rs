@@ -1,17 +1,11 @@
-//! P(moves): whether what was found to move really does.
+//! Cues to P(moves): whether what was found to move really does.
 //!
 //! The hypothesis test says what a cluster most likely did. How likely that is follows from cues of
-//! the cluster and of the column, weighted by logistic regression (`raywake-lab train moves`). Two
-//! of them accumulate evidence over time: those of the tracklets that moved before.
-
-use crate::params::MovesParams;
+//! the cluster and of the column ([`forest`](super::forest), fitted by `raywake-lab train moves`).
+//! Three of them accumulate evidence over time: those of the tracklets.
 
 /// The largest margin that counts: beyond it the case is clear.
 const MARGIN_MAX: f32 = 0.5;
-
-/// The largest score of what could move that counts, nats: beyond it the case is clear. Not tuned
-/// separately.
-const COULD_MOVE_MAX: f32 = 4.0;
 
 /// Pseudo-count added to the looks at voxels, so that few looks do not say much.
 const FEW_LOOKS: f32 = 8.0;
@@ -29,11 +23,11 @@ impl Cue for bool {
     const NONE: bool = false;
 }
 
-/// Declares cues, each with the parameter that is its weight.
+/// Declares cues.
 macro_rules! cues {
     (
         $(#[$doc:meta])* pub struct $name:ident {
-            $($(#[$field_doc:meta])* pub $field:ident: $type:ty => $weight:ident,)*
+            $($(#[$field_doc:meta])* pub $field:ident: $type:ty,)*
         }
     ) => {
         $(#[$doc])*
@@ -46,16 +40,12 @@ macro_rules! cues {
             /// No cue at all.
             pub const NONE: $name = $name { $($field: <$type as Cue>::NONE),* };
 
-            /// Names of the parameters that are their weights, in order.
-            pub const WEIGHTS: &[&str] = &[$(stringify!($weight)),*];
+            /// Their names, in order.
+            pub const NAMES: &[&str] = &[$(stringify!($field)),*];
 
             /// Their values, in order.
-            pub fn values(&self) -> [f32; $name::WEIGHTS.len()] {
+            pub fn values(&self) -> [f32; $name::NAMES.len()] {
                 [$(f32::from(self.$field)),*]
-            }
-
-            fn logit(&self, params: &MovesParams) -> f32 {
-                params.moves_bias $(+ params.$weight * f32::from(self.$field))*
             }
         }
     };
@@ -65,29 +55,34 @@ cues! {
     /// Cues to whether a column moves.
     pub struct Cues {
         /// Evidence for the cluster's motion beyond what the test asked for, at most 0.5.
-        pub margin: f32 => moves_margin,
+        pub margin: f32,
         /// Share of the cluster's columns whose tracklets moved, relative to the quorum.
-        pub share: f32 => moves_share,
+        pub share: f32,
         /// Mean truncated residual of the motion, or of rest if none was tried, 0 to 1.
-        pub residual: f32 => moves_residual,
+        pub residual: f32,
         /// Logarithm of the number of returns that were registered.
-        pub returns: f32 => moves_returns,
+        pub returns: f32,
         /// Mean of log(1 + speed / its standard deviation) over the tracklets that moved.
-        pub certainty: f32 => moves_certainty,
+        pub certainty: f32,
+        /// Mean P(moves) of its tracklets when they were last observed, 0 if there are none.
+        pub earlier: f32,
         /// Share of looks that hit something else, of those at the cluster's voxels in sweeps in
         /// which, by its motion, it was not there yet ([`Looks`]).
-        pub worn: f32 => moves_worn,
+        pub worn: f32,
         /// Share of the same looks that found nothing.
-        pub fresh: f32 => moves_fresh,
+        pub fresh: f32,
         /// By how much the column's own returns fit rest worse than the motion, -1 to 1.
-        pub misfit: f32 => moves_misfit,
-        /// The encoder's score of what could move, nats: -4 to 4, 0 if it is ignored.
-        pub could_move: f32 => moves_could_move,
+        pub misfit: f32,
+        /// The encoder's score of what could move, nats, cut to
+        /// [`could_move_max`](crate::params::RefinementParams::could_move_max) either way; 0 if it
+        /// is ignored.
+        pub could_move: f32,
         /// There was at most one sweep before the pair: no tracklet predicts yet, and one look back
         /// hardly shows that it came.
-        pub no_history: bool => moves_no_history,
-        /// The test found it static. Of the others only `share` and `could_move` are set then.
-        pub stands: bool => moves_stands,
+        pub no_history: bool,
+        /// The test found it static. Of the others only `share`, `earlier` and `could_move` are set
+        /// then.
+        pub stands: bool,
     }
 }
 
@@ -96,7 +91,7 @@ cues! {
 pub(super) struct ColumnCues {
     /// By how much its returns fit rest worse than its cluster's motion.
     pub misfit: f32,
-    /// The encoder's score of what could move, nats.
+    /// The encoder's score of what could move, cut as in [`Cues::could_move`].
     pub could_move: f32,
 }
 
@@ -114,6 +109,7 @@ impl Cues {
             residual,
             returns: libm::logf(returns.max(1) as f32),
             certainty: prior.certainty,
+            earlier: prior.earlier,
             worn: 0.0,
             fresh: 0.0,
             misfit: 0.0,
@@ -123,20 +119,16 @@ impl Cues {
         }
     }
 
-    /// Cues of something static, with this [`Cues::share`] and [`Cues::could_move`].
-    pub(super) fn stationary(share: f32, could_move: f32) -> Cues {
-        Cues { share, stands: true, ..Cues::NONE }
+    /// Cues of something static, given those of its cluster.
+    pub(super) fn stationary(of_cluster: &Cues, could_move: f32) -> Cues {
+        let &Cues { share, earlier, .. } = of_cluster;
+        Cues { share, earlier, stands: true, ..Cues::NONE }
             .with(ColumnCues { could_move, ..ColumnCues::NONE })
     }
 
     /// The same with the cues of a column.
     pub(super) fn with(self, ColumnCues { misfit, could_move }: ColumnCues) -> Cues {
-        Cues { misfit, could_move: could_move.clamp(-COULD_MOVE_MAX, COULD_MOVE_MAX), ..self }
-    }
-
-    /// P(moves).
-    pub fn probability(&self, params: &MovesParams) -> f32 {
-        1.0 / (1.0 + libm::expf(-self.logit(params)))
+        Cues { misfit, could_move, ..self }
     }
 }
 
@@ -183,6 +175,8 @@ pub(crate) struct Prediction {
     pub by: [f32; 2],
     /// log(1 + speed / its standard deviation).
     pub certainty: f32,
+    /// P(moves), as last observed.
+    pub probability: f32,
 }
 
 /// What the tracklets of a cluster predict.
@@ -194,6 +188,8 @@ pub(super) struct Prior {
     pub share: f32,
     /// Mean certainty of those tracklets.
     pub certainty: f32,
+    /// Mean P(moves) of all its tracklets, as last observed.
+    pub earlier: f32,
 }
 
 impl Prior {
@@ -207,9 +203,10 @@ impl Prior {
     ) -> Prior {
         let moves = |[x, y]: [f32; 2]| x * x + y * y > least * least;
         let (mut known, mut moving) = (0.0, 0.0);
-        let (mut sum, mut certainty) = ([0.0; 2], 0.0);
-        for Prediction { by, certainty: own } in predictions {
+        let (mut sum, mut certainty, mut earlier) = ([0.0; 2], 0.0, 0.0);
+        for Prediction { by, certainty: own, probability } in predictions {
             known += 1.0;
+            earlier += probability;
             sum = [sum[0] + by[0], sum[1] + by[1]];
             if moves(by) {
                 moving += 1.0;
@@ -221,6 +218,7 @@ impl Prior {
             by: moves(mean).then_some(mean),
             share: (moving / (quorum * columns as f32)).min(1.0),
             certainty: certainty / f32::max(moving, 1.0),
+            earlier: earlier / f32::max(known, 1.0),
         }
     }
 }
@@ -228,10 +226,9 @@ impl Prior {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::{Parameters, Value};
 
     fn prior(moving: usize, resting: usize) -> Prior {
-        let one = |x| Prediction { by: [x, 0.0], certainty: 2.0 * x };
+        let one = |x| Prediction { by: [x, 0.0], certainty: 2.0 * x, probability: x };
         let predictions = core::iter::repeat_n(one(1.0), moving);
         let all = predictions.chain(core::iter::repeat_n(one(0.0), resting));
         Prior::of(40, 0.5, 0.1, all)
@@ -249,33 +246,5 @@ mod tests {
         let one = prior(1, 39);
         assert_eq!((one.by, one.certainty), (None, 2.0));
         assert_eq!(prior(0, 40).certainty, 0.0);
-    }
-
-    #[test]
-    fn cues_are_weighed_by_their_parameters() {
-        let zero = MovesParams { moves_bias: 0.0, ..MovesParams::DEFAULT };
-        assert_eq!(Cues::NONE.probability(&zero), 0.5);
-        for (n, name) in Cues::WEIGHTS.iter().enumerate() {
-            let mut params = zero;
-            for other in Cues::WEIGHTS {
-                let value = if other == name { 3f64.ln() } else { 0.0 };
-                params.set(other, Value::Number(value)).unwrap();
-            }
-            let one = |field: usize| f32::from(field == n);
-            let cues = Cues {
-                margin: one(0),
-                share: one(1),
-                residual: one(2),
-                returns: one(3),
-                certainty: one(4),
-                worn: one(5),
-                fresh: one(6),
-                misfit: one(7),
-                could_move: one(8),
-                no_history: n == 9,
-                stands: n == 10,
-            };
-            assert!((cues.probability(&params) - 0.75).abs() < 1e-6, "{name}");
-        }
     }
 }

@@ -15,23 +15,24 @@
 //! 4. A hypothesis test separates dynamic clusters from static ones ([`hypothesis`]): with r0 and r
 //!    the mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman,
 //!    2000), the evidence for motion is (1 - r / r0) sqrt(r0 - r). Up to two sweeps before the pair
-//!    are compared, the earlier one from 0.3 s before it at 10 Hz: a pedestrian has moved by then.
+//!    are compared, the earlier one from 0.5 s before it at 10 Hz: a pedestrian has moved by then.
 //!    At rest only what can be seen counts: where a return fits badly, or nothing is near, a ray
 //!    must have passed to decide ([`sightlines`]). The same holds for a motion if the encoder says
 //!    that the cluster could move, or if it moved in the last sweep; otherwise returns that end up
 //!    out of sight count as missed, because behind a corner anything fits, except those that were
 //!    outside the window before the pair. A cluster that moved in the last sweep needs less
 //!    evidence.
-//! 5. A static cluster may have a moving part ([`clusters`]): columns that fit badly at rest, or
-//!    that came to where nothing was before. The remainder of the cluster, fragments next to the
-//!    part and what the encoder takes for the rest of its body may go with it ([`bodies`]). A part
-//!    is taken out again if it could not move, as far as the encoder knows, shows no motion of its
-//!    own, and is where something was hit before: the cluster only passes it.
+//! 5. A static cluster may have a moving part ([`clusters`]): columns that fit badly at rest in the
+//!    second sweep or in the earliest, or that came to where nothing was before. The remainder of
+//!    the cluster, fragments next to the part and what the encoder takes for the rest of its body
+//!    may go with it ([`bodies`]). A part is taken out again if it could not move, as far as the
+//!    encoder knows, shows no motion of its own, and is where something was hit before: the cluster
+//!    only passes it.
 //! 6. All columns of a dynamic cluster move with it, including those that the background filter
 //!    removed or that found no match, and the ground below it ([`footprint`]), unless the encoder
 //!    takes that for road beside it. Covariances are inflated by the residual ([`refined`]).
-//! 7. Cues determine how likely it is that a column moves ([`cues`]), among them what was hit
-//!    before at the places it came to ([`history`]).
+//! 7. Cues determine how likely it is that a column moves ([`cues`], [`forest`]), among them what
+//!    was hit before at the places it came to ([`history`]).
 //!
 //! Parameters are those of [`RefinementParams`](crate::params::RefinementParams), in metres;
 //! internally, lengths are in voxels ([`scaled`]).
@@ -45,6 +46,7 @@ mod cluster;
 mod clusters;
 pub mod cues;
 mod footprint;
+pub mod forest;
 mod history;
 mod hypothesis;
 mod motion;

@@ -1,11 +1,10 @@
 //! Rigid motion of a cluster.
 
-use crate::params::REFINEMENT_SWEEPS_MAX;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 
-/// Maximum number of sweeps that a cluster is compared with: the pair's second, and every other one
-/// before the pair. In those in between, slow objects look much as in the neighbouring sweeps.
-pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX.div_ceil(2);
+/// Maximum number of sweeps that a cluster is compared with: the pair's second, the one before the
+/// pair, and the oldest, in which what is slow has moved most. More are not worth their time.
+pub const TARGETS_MAX: usize = 3;
 
 /// Rigid motion in the plane over one pair of sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -54,7 +54,7 @@ impl Refined {
 
     /// A column that nothing is known about.
     pub fn nothing() -> Refined {
-        let cues = Cues::stationary(0.0, 0.0);
+        let cues = Cues::stationary(&Cues::NONE, 0.0);
         Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false, cues }
     }
 

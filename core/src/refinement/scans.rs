@@ -187,6 +187,12 @@ impl<'a> Scans<'a> {
         mean.value()
     }
 
+    /// Mean residual of a column at rest in the earliest sweep, 0 if that is the pair's second.
+    pub fn early_residual(&self, column: usize) -> f32 {
+        let [_, .., earliest] = self.targets else { return 0.0 };
+        self.column_residual(column, |s| self.seen_residual(s, &Motion::default(), earliest))
+    }
+
     /// By how much the returns of a column fit rest worse than a motion, 0 if that cannot be seen.
     pub fn misfit(&self, column: usize, motion: &Motion) -> f32 {
         let mut mean = Mean::default();

@@ -152,9 +152,10 @@ impl Tracklets {
     /// What the tracklet in a column predicts over `dt_s` seconds, voxels; `None` below
     /// [`PREDICTING_AGE`].
     pub(crate) fn predict(&self, column: usize, dt_s: f32, voxel_m: f32) -> Option<Prediction> {
-        let ekf = self.at(column).filter(|t| t.age >= PREDICTING_AGE)?.ekf;
+        let &Tracklet { ekf, probability, .. } =
+            self.at(column).filter(|t| t.age >= PREDICTING_AGE)?;
         let by = ekf.velocity().0.map(|v| v * dt_s / voxel_m);
-        Some(Prediction { by, certainty: ekf.certainty() })
+        Some(Prediction { by, certainty: ekf.certainty(), probability })
     }
 
     /// Drops all tracklets.

@@ -3,6 +3,7 @@
 use super::Observation;
 use crate::params::{FOREGROUND_MAX, Profile};
 use crate::perceive::Perceived;
+use crate::prepare::Setup;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::refinement::cues::Cues;
@@ -24,7 +25,7 @@ impl Observations {
     /// Collects those of a pair.
     pub fn collect(
         &mut self,
-        profile: &Profile,
+        Setup { profile, moves, .. }: &Setup,
         sweep: &SweepUniform,
         perceived: &Perceived,
         refinement: &Refinement,
@@ -43,7 +44,7 @@ impl Observations {
             };
             let Some((moved, covariance, cues)) = moved else { continue };
             let probability = match cues {
-                Some(cues) => cues.probability(&profile.moves),
+                Some(cues) => moves.probability(&cues),
                 None => (moved != [0.0; 2]) as u8 as f32,
             };
             let cues = cues.unwrap_or(Cues::NONE);

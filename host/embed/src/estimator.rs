@@ -8,6 +8,7 @@ use raywake_core::perceive::{ScalarBackend, StepContext};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::prepare::{Preparation, Setup};
+use raywake_core::refinement::forest::{self, MovesForest};
 use raywake_core::sweep::{Point, Sweep};
 use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
@@ -146,6 +147,7 @@ impl FlowEstimator {
             profile: profile.clone(),
             rig: rig.clone(),
             scores,
+            moves: MovesForest::load(forest::SHIPPED).map_err(CreateError::Weights)?,
             unfiltered: false,
             preparation: Preparation::new(),
         };

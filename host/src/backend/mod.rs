@@ -6,6 +6,7 @@ use raywake_core::encoder::EncoderWeights;
 use raywake_core::params::Profile;
 use raywake_core::perceive::{self, Perceive, Perceived, RayInput, StageTimer};
 use raywake_core::record::SweepUniform;
+use raywake_core::refinement::forest::MovesForest;
 use raywake_core::stages::background_filter::{self, TABLE_WORDS};
 use raywake_core::stages::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
 use raywake_core::team::Team;
@@ -21,6 +22,8 @@ pub enum LearnedPart {
     Constancy,
     /// The encoder.
     Encoder,
+    /// P(moves).
+    Moves,
 }
 
 /// Why a weights file does not fit a profile.
@@ -29,6 +32,7 @@ pub enum LearnedPart {
     LearnedPart::Filter => "background filter",
     LearnedPart::Constancy => "occupancy constancy",
     LearnedPart::Encoder => "encoder",
+    LearnedPart::Moves => "P(moves)",
 })]
 pub struct TablesError {
     /// Which file.
@@ -54,6 +58,8 @@ pub struct Tables {
     pub unfiltered: bool,
     /// See [`EncoderWeights::load`]; `None` if nothing is encoded.
     pub encoder: Option<Box<EncoderWeights>>,
+    /// See [`MovesForest::load`].
+    pub moves: MovesForest,
 }
 
 impl Tables {
@@ -64,6 +70,7 @@ impl Tables {
         filter: Option<&str>,
         constancy: &str,
         encoder: Option<&str>,
+        moves: &str,
     ) -> Result<Tables, TablesError> {
         let levels = profile.levels as usize;
         let mut table = vec![0; TABLE_WORDS];
@@ -89,6 +96,8 @@ impl Tables {
             provenance,
             unfiltered: filter.is_none(),
             encoder: encoder.map(|text| encoder_weights(text, levels)).transpose()?,
+            moves: MovesForest::load(moves)
+                .map_err(|why| TablesError { of: LearnedPart::Moves, why })?,
         })
     }
 }

@@ -302,6 +302,7 @@ mod tests {
     use crate::labels::{Kind, Labels, Track};
     use raywake_core::encoder::SHIPPED;
     use raywake_core::output::FlowBasis;
+    use raywake_core::refinement::forest;
     use raywake_core::stages::occupancy_constancy;
     use raywake_core::sweep::Point;
     use raywake_io::source::Source;
@@ -348,6 +349,7 @@ mod tests {
             None,
             occupancy_constancy::shipped(profile.frame),
             Some(SHIPPED),
+            forest::SHIPPED,
         )
         .unwrap();
         let rig = source.rig().clone();

@@ -201,6 +201,8 @@ row! {
     /// See `margin`.
     certainty: f32,
     /// See `margin`.
+    earlier: f32,
+    /// See `margin`.
     worn: f32,
     /// See `margin`.
     fresh: f32,
@@ -232,8 +234,8 @@ macro_rules! cue_columns {
 }
 
 cue_columns!(
-    margin, share, residual, returns, certainty, worn, fresh, misfit, could_move, no_history,
-    stands
+    margin, share, residual, returns, certainty, earlier, worn, fresh, misfit, could_move,
+    no_history, stands
 );
 
 impl Row {

@@ -11,6 +11,7 @@ use super::weights_file::{quantise, text};
 use crate::curve::Curve;
 use raywake::backend::Tables;
 use raywake_core::params::{Frame, Profile};
+use raywake_core::refinement::forest;
 use raywake_core::weights::Weights;
 use raywake_io::Error;
 use serde::Serialize;
@@ -148,7 +149,7 @@ fn data(samples: &[Sample], ridge: f64) -> Data {
 }
 
 fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measured, Error> {
-    let tables = Tables::load(&Profile::hdl64(), None, text, None)
+    let tables = Tables::load(&Profile::hdl64(), None, text, None, forest::SHIPPED)
         .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
     let mut counts = [Ranking::default(); 2];
     let mut ranker = Ranker::new(Profile::hdl64().columns());

@@ -1,5 +1,6 @@
 //! `raywake-lab train`: the learned numbers of chapter 3.
 
+mod boosting;
 mod constancy;
 mod constancy_samples;
 pub(crate) mod drives;
@@ -33,7 +34,7 @@ pub enum Command {
     Encoder(encoder::Args),
     /// The features of chapter 4 as printed, off-board
     Flsf(flsf::Args),
-    /// P(moves): the weights of its cues (after the refinement, which has no section)
+    /// P(moves) from its cues (after the refinement, which has no section)
     Moves(moves::Args),
 }
 

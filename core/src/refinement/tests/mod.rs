@@ -246,7 +246,7 @@ fn run_with_scores(
 ) {
     let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
     refinement.run(&SingleThread, &step, flows, scores, |_| {
-        expected.map(|by| Prediction { by, certainty: 3.0 })
+        expected.map(|by| Prediction { by, certainty: 3.0, probability: 1.0 })
     });
 }
 

@@ -175,7 +175,7 @@ fn a_wall_that_seems_to_move_is_static() {
     let flows = vec![pack_flow([10, 0]); 167 * 167];
     let step = SweepUniform { side: 167, ..SweepUniform::default() };
     refinement.run(&SingleThread, &step, &flows, &[], |_| {
-        Some(Prediction { by: [10.0, 0.0], certainty: 3.0 })
+        Some(Prediction { by: [10.0, 0.0], certainty: 3.0, probability: 1.0 })
     });
     let extent_max = scaled().extent_max;
     let longest = refinement.clusters.found().iter().map(|f| f.extent).fold(0.0, f32::max);
@@ -298,7 +298,7 @@ fn potential_movers_may_go_where_nothing_is_seen() {
     let [unknown, known] = [cluster(&[]), cluster(&could)].map(residual);
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
     // What moved before can also move.
-    let moved = |_| Some(Prediction { by: [2.0, 0.0], certainty: 3.0 });
+    let moved = |_| Some(Prediction { by: [2.0, 0.0], certainty: 3.0, probability: 1.0 });
     let found = hypothesis::test(cluster(&[]), |_| 0, moved, &mut ColumnSet::new());
     assert!(found.is_dynamic && found.cues.residual < 0.05, "{}", found.cues.residual);
 }

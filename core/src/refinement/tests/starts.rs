@@ -26,8 +26,13 @@ fn in_a_row_of_cars_each_moves_as_traffic_does() {
         let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
         let flows = vec![pack_flow([-5, 0]); SIDE * SIDE];
         // Tracklets elsewhere.
-        let predict =
-            |c: usize| traffic.filter(|_| c % SIDE < 4).map(|by| Prediction { by, certainty: 3.0 });
+        let predict = |c: usize| {
+            traffic.filter(|_| c % SIDE < 4).map(|by| Prediction {
+                by,
+                certainty: 3.0,
+                probability: 1.0,
+            })
+        };
         refinement.run(&SingleThread, &step, &flows, &[], predict);
         let first_car = motions(&refinement).split_off(29 * SIDE);
         let mut moved: Vec<f32> = first_car.iter().flatten().map(|m| m.0[0]).collect();

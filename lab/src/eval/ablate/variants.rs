@@ -63,7 +63,10 @@ pub const VARIANTS: [Variant; 30] = [
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
     of("refine-2", "refined by 2 sweeps", |p| Profile { refinement_sweeps: 2, ..p }),
     of("refine-3", "refined by 3 sweeps", |p| Profile { refinement_sweeps: 3, ..p }),
-    of("refine-5", "refined by every other of 5 sweeps", |p| Profile { refinement_sweeps: 5, ..p }),
+    of("refine-5", "refined by 5 sweeps, three compared", |p| Profile {
+        refinement_sweeps: 5,
+        ..p
+    }),
     of("smoothing-0", "w_p = 0", |p| Profile { smoothing: 0, ..p }),
     of("smoothing-0.1", "w_p = 0.1", |p| Profile { smoothing: 100, ..p }),
     of("smoothing-0.3", "w_p = 0.3", |p| Profile { smoothing: 300, ..p }),
@@ -88,7 +91,7 @@ pub const VARIANTS: [Variant; 30] = [
         p
     }),
     of("encoder-no-cue", "P(moves) without the class", |mut p| {
-        p.moves.moves_could_move = 0.0;
+        p.refinement.could_move_max = 0.0;
         p
     }),
     Variant {
