@@ -80,7 +80,8 @@ crate::params! {
         pub refinement_sweeps: u32 = 7, "sweeps", (0 or 2 to 7),
             "2 sweeps: 5.8 cm mean error of movers against 4.4 cm with 3, whole cells 38.8 cm \
              (`raywake-lab ablate`). Precision and recall of columns reported as moving \
-             (`raywake-lab sim --sweeps 25`, `vlp32x2` and `hdl64`), with 5 and here: slow streets \
+             (`raywake-lab sim --sweeps 25`, `vlp32x2` and `hdl64`), with 5 and here, both by \
+             weights of P(moves) fitted without airborne clutter, from 0.25 on: slow streets \
              (`--drives 4 --seed 9001`) 96.6 and 95.7 %, 97.1 and 95.7; crowded ones 98.1 and \
              95.1, 98.2 and 95.2; outskirts (`--drives 6 --seed 7171`) 96.5 and 94.8, 97.1 and \
              94.6; residential ones (`--seed 8181`) 93.7 and 94.5, 94.1 and 94.4.";

@@ -133,6 +133,7 @@ mod tests {
             "list",
             #[cfg(feature = "pcap")]
             "metadata",
+            "moves",
             "pose",
             "poses",
             #[cfg(feature = "pcap")]
