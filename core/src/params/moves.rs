@@ -1,4 +1,4 @@
-//! Parameters for deciding whether a column moves: see [`crate::refinement::cues`].
+//! Parameters for deciding whether a column moves: see [`crate::refinement::forest`].
 
 crate::params! {
     /// What P(moves) decides.

@@ -246,5 +246,7 @@ mod tests {
         let one = prior(1, 39);
         assert_eq!((one.by, one.certainty), (None, 2.0));
         assert_eq!(prior(0, 40).certainty, 0.0);
+        // P(moves) is the mean over all.
+        assert_eq!([prior(20, 0).earlier, one.earlier, prior(0, 0).earlier], [1.0, 0.025, 0.0]);
     }
 }

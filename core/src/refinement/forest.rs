@@ -43,23 +43,14 @@ pub struct MovesForest {
     scale: f32,
 }
 
-impl Default for MovesForest {
-    fn default() -> MovesForest {
-        MovesForest::new()
-    }
-}
-
 impl MovesForest {
-    /// Before it is loaded: everything moves with a probability of one half.
-    pub const fn new() -> MovesForest {
-        let tree = Tree { cues: [0; QUESTIONS], above: [0.0; QUESTIONS], leaves: [0; LEAVES] };
-        MovesForest { trees: [tree; TREES_TOTAL], biases: [0; TREES.len()], scale: 1.0 }
-    }
-
     /// Reads a file of kind `moves`.
     pub fn load(text: &str) -> Result<MovesForest, WeightsError> {
         let file = Weights::parse(text, "moves", &[TREES_TOTAL, NUMBERS], TREES.len())?;
-        let (mut forest, scale) = (MovesForest::new(), file.scale as f32);
+        let scale = file.scale as f32;
+        let empty = Tree { cues: [0; QUESTIONS], above: [0.0; QUESTIONS], leaves: [0; LEAVES] };
+        let (trees, biases) = ([empty; TREES_TOTAL], [0; TREES.len()]);
+        let mut forest = MovesForest { trees, biases, scale };
         let mut values = file.values();
         for tree in &mut forest.trees {
             for (cue, above) in tree.cues.iter_mut().zip(&mut tree.above) {
@@ -71,7 +62,6 @@ impl MovesForest {
             tree.leaves.fill_with(|| values.next().unwrap_or(0));
         }
         forest.biases.fill_with(|| values.next().unwrap_or(0));
-        forest.scale = scale;
         Ok(forest)
     }
 

@@ -371,7 +371,7 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "at most 8", [np.eye(4)] * 9, call=raywake.Rig)
         self.refuses(ValueError, "rig", rig=raywake.Rig([]), call=make)
         self.refuses(ValueError, "rig", rig=raywake.Rig(ground=np.inf), call=make)
-        lower = raywake.Pipeline(settings={"moves_min": 0.3, "tracklet.gate_d2": 9.0})
+        lower = raywake.Pipeline(settings={"moves_min": 0.1, "tracklet.gate_d2": 9.0})
         self.assertGreater(lower.memory, 1 << 20)
         few = raywake.Pipeline(points_max=4)
         self.refuses(ValueError, "4 returns", self.points, 0.0, np.eye(4), call=few.step)

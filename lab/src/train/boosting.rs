@@ -9,9 +9,11 @@ use super::logistic::Progress;
 use raywake_core::refinement::forest::{LEAVES, QUESTIONS};
 use std::ops::Range;
 
-/// Steps per unit of a value and per nat. Fine enough that rounding matters to no question.
+/// Steps per unit of a value and per nat.
 pub const SCALE: f64 = 1000.0;
-/// Share of Newton's step that a tree takes.
+/// Share of Newton's step that a tree takes. With 0.15 to 0.4, and 20 to 400 for [`RIDGE`], the
+/// loss of 100 trees on held-out drives is 0.0685 to 0.0714 nat (56 drives, the first seven of
+/// `lab/README.md`).
 const RATE: f64 = 0.25;
 /// Added to the second derivatives of a leaf, each at most a quarter: leaves of a few samples say
 /// little.

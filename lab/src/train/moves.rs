@@ -1,6 +1,6 @@
 //! `raywake-lab train moves`: P(moves) from the cues of columns in results of `raywake-lab eval`.
 
-use super::boosting::{self, SCALE, Samples};
+use super::boosting::{self, Boosted, SCALE, Samples};
 use super::logistic::Progress;
 use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file;
@@ -50,16 +50,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let [training, held_out] = [&training, &held_out].map(|part| part_of(part, stands));
         boosting::fit(TREES[usize::from(stands)], &training, &held_out)
     });
-    let trees = fitted.iter().flat_map(|f| &f.trees);
-    let numbers: Vec<i32> = trees.chain(fitted.iter().map(|f| &f.bias)).copied().collect();
-    let progress = fitted.map(|f| f.progress);
-    let losses = progress.each_ref().map(|of| of.last().map_or(0.0, |p| p.held_out));
+    let losses = fitted.each_ref().map(|f| f.progress.last().map_or(0.0, |p| p.held_out));
     let provenance = format!(
         "raywake-lab train moves, {drives} evaluations of drives, boosted trees, held-out loss of \
          what was found to move {:.4}, of what stands {:.4}",
         losses[0], losses[1]
     );
-    let text = weights_file::text("moves", &[TREES_TOTAL, NUMBERS], SCALE, &numbers, &provenance);
+    let text = text(&fitted, &provenance);
     let forest = MovesForest::load(&text).map_err(|e| Error::Usage(e.to_string()))?;
     let scored = || held_out.iter().map(|(cues, moves)| (f64::from(forest.logit(cues)), *moves));
     let (brier, reliability) = reliability(scored());
@@ -67,8 +64,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Curve::of(scored().map(|(score, moves)| (score, moves, 1.0))).expect("both are there");
     let curve = RECALLS.map(|r| curve.at_recall(r)).to_vec();
     let [training, held_out] = counts;
+    let progress = fitted.map(|f| f.progress);
     let report = Report { training, held_out, progress, brier, reliability, curve };
     args.outputs.write(&text, &report)
+}
+
+/// The text of a weights file.
+fn text(fitted: &[Boosted; 2], provenance: &str) -> String {
+    let trees = fitted.iter().flat_map(|f| &f.trees);
+    let numbers: Vec<i32> = trees.chain(fitted.iter().map(|f| &f.bias)).copied().collect();
+    weights_file::text("moves", &[TREES_TOTAL, NUMBERS], SCALE, &numbers, provenance)
 }
 
 /// The cues of a column, and whether it moves.
@@ -127,6 +132,32 @@ mod tests {
         assert!(counts(&row) && counts(&Row { motion: 0, ..row }));
         assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { basis: 1, ..row }));
         assert!(!counts(&Row { in_view: false, ..row }) && !counts(&Row { below: true, ..row }));
+    }
+
+    #[test]
+    fn what_is_read_is_what_was_fitted() {
+        let mut rng = raywake_sim::Rng::new(3);
+        let mut samples: Vec<Sample> = Vec::new();
+        for n in 0..600 {
+            let [margin, worn, misfit] = [(); 3].map(|()| rng.range(-1.0, 1.0) as f32);
+            let cues = Cues { margin, worn, misfit, stands: n % 3 == 0, ..Cues::NONE };
+            samples.push((cues, margin * worn > 0.2 * misfit));
+        }
+        let fitted = [false, true].map(|stands| {
+            let part = part_of(&samples, stands);
+            boosting::fit(TREES[usize::from(stands)], &part, &part)
+        });
+        let forest = MovesForest::load(&text(&fitted, "test")).unwrap();
+        for stands in [false, true] {
+            let part: Vec<&Sample> = samples.iter().filter(|s| s.0.stands == stands).collect();
+            let loss = part.iter().map(|(cues, moves)| {
+                let logit = f64::from(forest.logit(cues));
+                (if *moves { -logit } else { logit }).exp().ln_1p()
+            });
+            let loss = loss.sum::<f64>() / part.len() as f64;
+            let expected = fitted[usize::from(stands)].progress.last().unwrap().held_out;
+            assert!((loss - expected).abs() < 1e-5, "{loss} {expected}");
+        }
     }
 
     #[test]
