@@ -247,8 +247,8 @@ pub struct ColumnFlow {
     pub age: u32,
     /// Where the flow comes from.
     pub basis: FlowBasis,
-    /// P(moves). Below [`moves_min`](crate::params::MovesParams::moves_min), or what takes its place
-    /// in first pairs, displacement and velocity are those of static structure.
+    /// P(moves). Below [`moves_min`](crate::params::MovesParams::moves_min), or what takes its
+    /// place in first pairs, displacement and velocity are those of static structure.
     pub probability: f32,
     /// The cues behind that; zeros if nothing was found to move.
     pub cues: Cues,
